@@ -404,9 +404,9 @@ void Camera::set_shutter(const std::optional<CameraPose>& open, const std::optio
 std::optional<scene::ViewEnds> Camera::ends(double aspect, const scene::Viewpoint& now) const {
   const std::scoped_lock lock(mutex_);
   if (!shutter_holds() || !(aspect > 0.0)) return std::nullopt;
-  const auto end = [&](const std::optional<CameraPose>& told) {
-    if (!told) return now;
-    CameraPose pose = *told;
+  const auto end = [&](const std::optional<CameraPose>& given) {
+    if (!given) return now;
+    CameraPose pose = *given;
     pose.near_plane = pose_.near_plane;
     pose.far_plane = pose_.far_plane;
     pose.depth = pose_.depth;
@@ -611,7 +611,7 @@ Camera::Edit::~Edit() {
   const bool changed = camera_.revision_ != before_;
   lock_.unlock();
   if (!changed) return;
-  camera_.listeners_.tell();
+  camera_.listeners_.notify();
 }
 
 }  // namespace cumulet::viewer

@@ -59,7 +59,7 @@ class Shared {
       change(settings_);
       ++revision_;
     }
-    listeners_.tell();
+    listeners_.notify();
   }
   [[nodiscard]] Settings get() const {
     const std::scoped_lock lock(mutex_);

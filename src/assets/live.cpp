@@ -117,7 +117,7 @@ Live::Request Live::want(const scene::Emission& emission) {
     std::erase_if(requests_, [](const auto& other) { return other.expired(); });
     requests_.push_back(request);
   }
-  request_listeners_.tell();
+  request_listeners_.notify();
   return request;
 }
 
@@ -150,7 +150,7 @@ bool Live::hand_over(Whole whole, std::vector<Handed> handed, const MakeLease& l
     std::swap(in_gl_, state);
     ++newest_;
   }
-  listeners_.tell();
+  listeners_.notify();
   return true;
 }
 
@@ -221,7 +221,7 @@ void Live::hand_over(volume::Changes changes, const std::vector<Handed>& handed,
     next_.changes.put(std::move(changes));
     ++newest_;
   }
-  listeners_.tell();
+  listeners_.notify();
 }
 
 void Live::refuse_updates() {

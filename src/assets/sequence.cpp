@@ -20,7 +20,7 @@ void Sequence::edit(Change&& change) {
     if (!change(state_)) return;
     ++revision_;
   }
-  listeners_.tell();
+  listeners_.notify();
 }
 
 void Sequence::set_playback(const scene::Playback& playback) {

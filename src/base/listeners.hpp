@@ -11,7 +11,7 @@ namespace cumulet {
 /// Change listeners of an object. All calls are safe from any thread.
 class Listeners {
  public:
-  /// Calls `changed` in every tell(), on the thread of tell(), until the returned token is destroyed. After that no
+  /// Calls `changed` in every notify(), on the thread of notify(), until the returned token is destroyed. After that no
   /// call is under way. `changed` must not throw, call listen() or destroy a token.
   [[nodiscard]] std::shared_ptr<void> listen(std::function<void()> changed) {
     const std::scoped_lock lock(all_->mutex);
@@ -22,7 +22,7 @@ class Listeners {
             }};
   }
 
-  void tell() const {
+  void notify() const {
     const std::scoped_lock lock(all_->mutex);
     for (const auto& call : all_->calls) call();
   }

@@ -38,7 +38,7 @@ FrameCache::FrameCache(const JobContext& context)
       notify_(context.notify),
       trace_(context.trace),
       resource_limits_(context.resource_limits),
-      worker_([this] { tell(); }, context.trace) {}
+      worker_([this] { notify(); }, context.trace) {}
 
 void FrameCache::request(Request request) {
   if (job_log() != nullptr) job_log()->request(player(), request);
@@ -195,7 +195,7 @@ bool FrameCache::wait(std::optional<std::chrono::steady_clock::time_point> until
   return true;
 }
 
-void FrameCache::tell() {
+void FrameCache::notify() {
   {
     const std::scoped_lock lock(mutex_);  // so that a waiting thread has either not checked its condition yet, or is
                                           // waiting
@@ -345,7 +345,7 @@ void FrameCache::work(Progress& progress) {
         build(*step, settings, ends, progress);
       }
     });
-    tell();
+    notify();
   }
 }
 

@@ -157,7 +157,7 @@ class FrameCache : public JobSource {
   // Records that a frame, or else the step, cannot be made. Returns false if it is no longer requested.
   bool fail(const Which& which, std::optional<std::uint32_t> frame, const Error& failure, const Progress& progress);
   void say_failures(std::span<const Error> failures, bool another_is_shown) const;
-  void tell();
+  void notify();
 
   // mutex_ must be held for all of these.
   void start();

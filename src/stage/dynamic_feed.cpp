@@ -44,8 +44,8 @@ VolumeFeed::Taken DynamicFeed::take(bool is_seen) {
   if (waits_) return Taken::nothing;
   auto ready = builder_->take();
   if (!ready) return Taken::nothing;
-  told_.ready = ready->number;
-  ++told_.ready_count;
+  counts_.ready = ready->number;
+  ++counts_.ready_count;
   set_taken(ready->number, 0.0, std::move(ready->built));
   return Taken::other;
 }
@@ -62,7 +62,7 @@ VolumeAssetPtr DynamicFeed::volume() const {
 }
 
 DynamicFeed::Status DynamicFeed::status() const {
-  Status status = told_;
+  Status status = counts_;
   status.handed = live_->newest();
   return status;
 }
@@ -70,8 +70,8 @@ DynamicFeed::Status DynamicFeed::status() const {
 void DynamicFeed::note_displayed(const scene::SequenceFrame& shown) {
   if (shown.taken == seen_last_) return;
   seen_last_ = shown.taken;
-  told_.drawn = shown.number;
-  ++told_.displayed_count;
+  counts_.drawn = shown.number;
+  ++counts_.displayed_count;
 }
 
 }  // namespace cumulet::viewer

@@ -44,7 +44,7 @@ class DynamicFeed : public VolumeFeed {
   VolumeInfoPtr volume_info_;       // of all states, if their bounds are known
   bool waits_ = false;              // another state may be ready, but waits until the last one has been displayed
   std::uint64_t seen_last_ = 0;     // displayed last, as scene::SequenceFrame::taken
-  Status told_;                     // without `handed`
+  Status counts_;                   // without `handed`
   std::shared_ptr<void> listener_;  // last: it notifies the builder
 };
 

@@ -398,14 +398,14 @@ cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* pr
     cumulet_progress p{};
     p.stage = static_cast<cumulet_stage>(status.stage);
     p.fraction = status.fraction;
-    const auto tell = [](const std::optional<cumulet::Error>& failure, cumulet_status& code, auto& message) {
+    const auto report = [](const std::optional<cumulet::Error>& failure, cumulet_status& code, auto& message) {
       code = failure ? status_of(failure->code()) : CUMULET_OK;
       copy_text(failure ? failure->what() : "", message, sizeof message);
     };
-    tell(status.failure, p.status, p.message);
-    tell(status.volume_failure, p.volume_status, p.volume_message);
-    tell(status.surfaces_failure, p.surfaces_status, p.surfaces_message);
-    tell(status.environment_failure, p.environment_status, p.environment_message);
+    report(status.failure, p.status, p.message);
+    report(status.volume_failure, p.volume_status, p.volume_message);
+    report(status.surfaces_failure, p.surfaces_status, p.surfaces_message);
+    report(status.environment_failure, p.environment_status, p.environment_message);
     write_desc(progress, p, "cumulet_progress");
   });
 }

@@ -395,7 +395,7 @@ MapResult Context::update_map(const Shot& shot, const MapRequest& request, rende
   return {map.texture(), map.size(), map.slices(), !map.is_newest(), map.to_map(), map.range()};
 }
 
-void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
+void Context::report(const Shot& shot, const Frame& frame, FrameResult& result) {
   const bool drawing = draws(shot, frame);
   if (const render::Picture* shown = progressive_.shown()) {
     const DrawnAs now{shown->revision(), shown->done(), shown->has_holes(),
@@ -416,8 +416,8 @@ void Context::tell(const Shot& shot, const Frame& frame, FrameResult& result) {
 bool Context::is_news(const Shot& shot, const Error& failure) {
   if (failure.code() != ErrorCode::gl) return true;
   std::pair<std::uint64_t, std::string> now(shot.settings, failure.what());
-  const bool news = told_ != now;
-  told_ = std::move(now);
+  const bool news = reported_ != now;
+  reported_ = std::move(now);
   return news;
 }
 

@@ -102,7 +102,7 @@ class Context {
   /// Returns true if this frame, which was uploaded last or is being uploaded, has not been displayed yet and will be.
   [[nodiscard]] bool has_pending_frame(const scene::SequenceFrame& frame) const;
   /// Fills in the result after the frame.
-  void tell(const Shot& shot, const Frame& frame, FrameResult& result);
+  void report(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Returns true if a failure should be reported. A program that fails to build fails in every frame until a setting
   /// changes.
   [[nodiscard]] bool is_news(const Shot& shot, const Error& failure);
@@ -238,9 +238,9 @@ class Context {
   render::HostDepth host_depth_;
   render::VoxelTransfers transfers_;
   Revision<render::HostDepth> host_depth_revision_;
-  std::optional<std::pair<std::uint64_t, std::string>> told_;  // the last GL failure that was reported, and its
-                                                               // settings
-  std::optional<DrawnAs> drawn_;                               // state drawn last; nullopt if an older image was drawn
+  std::optional<std::pair<std::uint64_t, std::string>> reported_;  // the last GL failure that was reported, and its
+                                                                   // settings
+  std::optional<DrawnAs> drawn_;  // state drawn last; nullopt if an older image was drawn
   render::Picture empty_;
   std::optional<std::uint64_t> alone_failed_;  // settings at which drawing surfaces without a volume failed
   Slot<TargetTextures, TargetKind> target_;

@@ -37,7 +37,7 @@ struct Failures {
     }
   }
   // Logs all but the first failure; throws the first, if any.
-  void tell(const Log& log) const {
+  void report(const Log& log) const {
     if (!first) return;
     for (const std::string& other : others) log.warning(other);
     throw Error(*first);
@@ -257,7 +257,7 @@ FrameResult Viewer::render(const Frame& frame) {
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
     attempt("cumulet: surfaces only", [&] { g.draw_surfaces_alone(shot, frame); });
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
-    g.tell(shot, frame, result);
+    g.report(shot, frame, result);
     remark_on_samples(g);
     volumes_.take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
@@ -270,7 +270,7 @@ FrameResult Viewer::render(const Frame& frame) {
     }
     if (failures.first && !g.is_news(shot, *failures.first)) failures = {};
   });
-  failures.tell(log_);
+  failures.report(log_);
   return result;
 }
 

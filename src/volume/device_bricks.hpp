@@ -52,7 +52,7 @@ constexpr unsigned block_of_voxel(unsigned v) { return ((v / 128) * 4 + (v / 16)
 class ValuesWanted {
  public:
   void ask() {
-    if (!asked_.exchange(true)) listeners_.tell();
+    if (!asked_.exchange(true)) listeners_.notify();
   }
   [[nodiscard]] bool asked() const { return asked_; }
   /// Listens for the first request: see Listeners::listen().

@@ -293,7 +293,7 @@ void measure_costs(headless::Context& context, const Input& input, const Options
     const EditedShaders all(std::array{all_looks});
     Rows looks(context, density_scale);
     looks.add("all made", plain, Burns::no, daylight, all.programs());
-    looks.add("those that tell", plain, Burns::no, daylight);
+    looks.add("those with information", plain, Burns::no, daylight);
     print_costs("Looks for sun and sky", looks.get(), options);
 
     const EditedShaders alike(std::array{any_analytic_light, all_alike});

@@ -91,12 +91,12 @@ class Bench {
     });
     auto stats = cumulet::test::make_desc<cumulet_stats>();
     must(viewer.get(), cumulet_get_stats(viewer.get(), &stats));
-    tell(scenario.name, budget_ms, taken, stats.samples);
+    print(scenario.name, budget_ms, taken, stats.samples);
   }
 
   void pace_of_control(const char* name, bool busy, double budget_ms) {
     const auto call = [&](int) { return [&] { control(budget_ms); }; };
-    tell(name, budget_ms, times(busy, call), 0);
+    print(name, budget_ms, times(busy, call), 0);
   }
 
   void readme_loop() {
@@ -129,7 +129,7 @@ class Bench {
     std::ranges::sort(taken);
     return taken;
   }
-  static void tell(const char* name, double budget_ms, const std::vector<double>& taken, std::uint64_t samples) {
+  static void print(const char* name, double budget_ms, const std::vector<double>& taken, std::uint64_t samples) {
     const auto at = [&](double part) { return taken[static_cast<std::size_t>(part * double(taken.size() - 1))]; };
     std::printf("| %-22s | %4.0f | %6.2f | %6.2f | %7.2f | %9llu |\n", name, budget_ms, at(0.5), at(0.95), taken.back(),
                 static_cast<unsigned long long>(samples));

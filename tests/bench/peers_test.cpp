@@ -232,7 +232,7 @@ TEST_P(PeersTest, ScatteringMatchesTheVoxels) {
   // The quadrature's own error, because it uses rays through pixel centers only.
   EXPECT_NEAR(shown.alpha.value, single.alpha, deviations * shown.alpha.error + 0.001 * single.alpha);
   EXPECT_NEAR(shown.radiance.value, single.radiance, deviations * shown.radiance.error + 0.001 * single.radiance);
-  EXPECT_LT(shown.radiance.error, 0.01 * single.radiance) << "tells too little";
+  EXPECT_LT(shown.radiance.error, 0.01 * single.radiance) << "carries too little information";
 
   Shows dense(context, volume, nullptr);
   const Shown all = nano.show(c.density_scale, 0, true, 32);
@@ -241,7 +241,7 @@ TEST_P(PeersTest, ScatteringMatchesTheVoxels) {
   const double radiance_error = std::hypot(all.radiance.error, same.radiance.error);
   EXPECT_NEAR(all.alpha.value, same.alpha.value, deviations * alpha_error);
   EXPECT_NEAR(all.radiance.value, same.radiance.value, deviations * radiance_error);
-  EXPECT_LT(radiance_error, 0.01 * same.radiance.value) << "tells too little";
+  EXPECT_LT(radiance_error, 0.01 * same.radiance.value) << "carries too little information";
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, PeersTest,

@@ -96,8 +96,8 @@ class Bench {
       const auto begun = Clock::now();
       must(viewer_.get(), cumulet_render(viewer_.get(), &frame_, nullptr));
       calls.push_back(1e3 * seconds_since(begun));
-      const cumulet_sequence_info told = info();
-      if (!drawn && told.is_displayed != 0 && told.displayed_frame == told.requested_frame) {
+      const cumulet_sequence_info status = info();
+      if (!drawn && status.is_displayed != 0 && status.displayed_frame == status.requested_frame) {
         drawn = true;
         ++hit;
         waited.push_back(since);
@@ -105,11 +105,11 @@ class Bench {
       const double rest = refresh - seconds_since(begun);
       if (rest > 0.0) std::this_thread::sleep_for(std::chrono::duration<double>(rest));
     }
-    const cumulet_sequence_info told = info();
+    const cumulet_sequence_info status = info();
     std::printf("| %s | %.3g | %lld | %lld | %.0f / %.0f | %.1f / %.1f / %.1f | %u of %u, %.0f MB |\n", name, rate_,
                 static_cast<long long>(asked + 1), static_cast<long long>(hit), at_part(waited, 0.5),
                 at_part(waited, 0.95), at_part(calls, 0.5), at_part(calls, 0.95), at_part(calls, 1.0),
-                told.ready_frames, told.frames, static_cast<double>(told.bytes) / 1e6);
+                status.ready_frames, status.frames, static_cast<double>(status.bytes) / 1e6);
   }
 
  private:

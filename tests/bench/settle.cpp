@@ -139,7 +139,7 @@ double median_at(const std::vector<std::vector<double>>& repeats, std::size_t mo
 }
 
 /// Indices of the times in the table.
-std::vector<std::size_t> told(const std::vector<double>& at) {
+std::vector<std::size_t> columns_of(const std::vector<double>& at) {
   std::vector<std::size_t> result;
   for (std::size_t i = 0; i < at.size(); i += 3) result.push_back(i);
   return result;
@@ -150,7 +150,7 @@ void print(const std::vector<Course>& courses, const Options& options) {
   std::printf(
       "\n%u x %u pixels, %g ms a frame, after %d steps of 1 degree, medians of %d\n\n| Scene | Change | Denoise |",
       options.size, options.size, options.budget_ms, steps, options.repeats);
-  const std::vector<std::size_t> columns = told(courses.front().at);
+  const std::vector<std::size_t> columns = columns_of(courses.front().at);
   for (const char* what : {"Error, %", "FLIP"}) {
     for (const std::size_t i : columns) {
       std::printf("%s%.2g s |", i == columns.front() ? (std::string(" ") + what + ", after ").c_str() : " ",

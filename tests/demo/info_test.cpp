@@ -47,7 +47,7 @@ class Info : public testing::Test {
     cumulet::demo::write_info(scene, false, out);
     return out.str();
   }
-  static json told(const SceneOptions& scene) {
+  static json info_of(const SceneOptions& scene) {
     std::ostringstream out;
     cumulet::demo::write_info(scene, true, out);
     return json::parse(out.str());
@@ -69,7 +69,7 @@ TEST_F(Info, DescribesAVdb) {
   meta.insertMeta("artist", openvdb::StringMetadata("a\nb"));
   write_vdb("two.vdb", {velocity, box("density")}, meta);
 
-  const json all = told(volume("two.vdb"));
+  const json all = info_of(volume("two.vdb"));
   EXPECT_FALSE(all.contains("surfaces"));
   const json& file = all["volume"];
   EXPECT_EQ(file["file"], path("two.vdb"));
@@ -115,7 +115,7 @@ TEST_F(Info, DescribesAVdb) {
 TEST_F(Info, DescribesANanoVdb) {
   const auto handle = nanovdb::openToNanoVDB(*box("smoke"));
   nanovdb::io::writeGrid(path("one.nvdb"), handle);
-  const json all = told(volume("one.nvdb"));
+  const json all = info_of(volume("one.nvdb"));
   EXPECT_NE(all["volume"]["format"].get<std::string>().find("NanoVDB"), std::string::npos);
   ASSERT_EQ(all["volume"]["grids"].size(), 1U);
   const json& grid = all["volume"]["grids"][0];
@@ -128,9 +128,9 @@ TEST_F(Info, DescribesANanoVdb) {
 TEST_F(Info, DescribesAScenesCameras) {
   write_vdb("one.vdb", {box("density")});
   SceneOptions scene = volume("one.vdb");
-  EXPECT_FALSE(told(scene).contains("scene"));
+  EXPECT_FALSE(info_of(scene).contains("scene"));
   for (const char* name : {"front", "the side"}) scene.cameras.emplace_back().name = name;
-  EXPECT_EQ(told(scene)["scene"], json::parse(R"({"cameras": [{"name": "front"}, {"name": "the side"}]})"));
+  EXPECT_EQ(info_of(scene)["scene"], json::parse(R"({"cameras": [{"name": "front"}, {"name": "the side"}]})"));
   expect_line(lines(scene), "- the side");
 }
 
@@ -160,7 +160,7 @@ TEST_F(Info, DescribesAModel) {
       .write(reinterpret_cast<const char*>(numbers.data()), sizeof numbers);
   SceneOptions scene;
   scene.surfaces = path("model.gltf");
-  const json all = told(scene);
+  const json all = info_of(scene);
   EXPECT_FALSE(all.contains("volume"));
   const json& model = all["surfaces"];
   EXPECT_EQ(model["file"], path("model.gltf"));
@@ -183,10 +183,10 @@ TEST_F(Info, DescribesAModel) {
   // Both at once.
   write_vdb("box.vdb", {box("density")});
   scene.volume = path("box.vdb");
-  const json both = told(scene);
+  const json both = info_of(scene);
   EXPECT_TRUE(both.contains("volume") && both.contains("surfaces"));
   scene.surfaces = path("none.glb");
-  EXPECT_THROW(told(scene), std::runtime_error);
+  EXPECT_THROW(info_of(scene), std::runtime_error);
 }
 
 TEST_F(Info, HintsAtTheUpAxisOfBlenderAndMantaflow) {

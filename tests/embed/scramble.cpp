@@ -385,12 +385,12 @@ TEST_P(StateScramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   const HostTarget target(*gl_, side, side);
   const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
   const auto volume = cumulet::test::make_ball(12);
-  int told = 0;
+  int messages = 0;
   const auto callback = [](GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar*, const void* user) {
     if (type == GL_DEBUG_TYPE_ERROR) ++*static_cast<int*>(const_cast<void*>(user));
   };
   gl_->Enable(GL_DEBUG_OUTPUT);
-  gl_->DebugMessageCallback(callback, &told);
+  gl_->DebugMessageCallback(callback, &messages);
   ASSERT_EQ(cumulet_set_volume(viewer.get(), volume.get()), CUMULET_OK);
   gl_->Enable(GL_FLOAT);  // not a capability
   converge(viewer.get(), target.frame());
@@ -401,8 +401,8 @@ TEST_P(StateScramble, PendingErrorsAreDroppedAndTheDebugCallbackIsTheHosts) {
   gl_->GetPointerv(GL_DEBUG_CALLBACK_USER_PARAM, &user);
   const GLDEBUGPROC expected = callback;
   EXPECT_EQ(function, reinterpret_cast<void*>(expected));
-  EXPECT_EQ(user, &told);
-  EXPECT_LE(told, 1);  // the host's own error, none of the library's
+  EXPECT_EQ(user, &messages);
+  EXPECT_LE(messages, 1);  // the host's own error, none of the library's
   gl_->DebugMessageCallback(nullptr, nullptr);
 }
 

@@ -134,7 +134,7 @@ class Program {
   }
 
   /// Checks the status of a viewer's call.
-  void told(cumulet_status status) {
+  void check(cumulet_status status) {
     const char* line = cumulet_last_error(viewer_.get());
     if (status != CUMULET_OK) check_line(line);
     if (status == CUMULET_OK && *line != '\0') fail("a success with an error");
@@ -282,12 +282,12 @@ class Program {
       return transforms;
     };
     const auto count = data_.ConsumeIntegralInRange(0U, most);
-    told(cumulet_set_volume_transforms(viewer_.get(), all().data(), count));
+    check(cumulet_set_volume_transforms(viewer_.get(), all().data(), count));
     const auto open = all();
     const auto close = all();
-    told(cumulet_set_volume_shutter_transforms(viewer_.get(), data_.ConsumeBool() ? open.data() : nullptr,
-                                               data_.ConsumeBool() ? close.data() : nullptr,
-                                               data_.ConsumeBool() ? count : most - count));
+    check(cumulet_set_volume_shutter_transforms(viewer_.get(), data_.ConsumeBool() ? open.data() : nullptr,
+                                                data_.ConsumeBool() ? close.data() : nullptr,
+                                                data_.ConsumeBool() ? count : most - count));
   }
 
   void change_instances() {
@@ -310,9 +310,9 @@ class Program {
         cumulet_instance_set_to_world(instance_.get(), desc[0].to_world);
         return;
       case 2:
-        return told(cumulet_add_instance(viewer_.get(), instance_.get()));
+        return check(cumulet_add_instance(viewer_.get(), instance_.get()));
       case 3:
-        return told(cumulet_remove_instance(viewer_.get(), instance_.get()));
+        return check(cumulet_remove_instance(viewer_.get(), instance_.get()));
       default: {
         cumulet_instance* instance = nullptr;
         made([&](char* error, std::size_t size) {
@@ -341,9 +341,9 @@ class Program {
         cumulet_model_set_time(model_.get(), bits<double>(number()));
         return;
       case 3:
-        return told(cumulet_add_model(viewer_.get(), model_.get()));
+        return check(cumulet_add_model(viewer_.get(), model_.get()));
       case 4:
-        return told(cumulet_remove_model(viewer_.get(), model_.get()));
+        return check(cumulet_remove_model(viewer_.get(), model_.get()));
       case 5: {
         const ModelRef again(cumulet_model_retain(model_.get()));
         if (again.get() != model_.get()) fail("a model that is another once it is retained");
@@ -433,7 +433,7 @@ class Program {
     desc.changed_count = desc.changed != nullptr ? data_.ConsumeIntegralInRange<std::uint64_t>(0, boxes.size()) : 0;
     desc.wait = nullptr;
     desc.name = data_.ConsumeBool() ? "a state\nof lines" : nullptr;
-    told(cumulet_dynamic_volume_set_gl(viewer_.get(), live_.get(), &desc));
+    check(cumulet_dynamic_volume_set_gl(viewer_.get(), live_.get(), &desc));
   }
 
   void change_live() {
@@ -458,7 +458,7 @@ class Program {
         return;
       }
       case 6:
-        return told(cumulet_set_dynamic_volume(viewer_.get(), data_.ConsumeBool() ? live_.get() : nullptr));
+        return check(cumulet_set_dynamic_volume(viewer_.get(), data_.ConsumeBool() ? live_.get() : nullptr));
       case 7:
         return get<cumulet_dynamic_volume_info>(cumulet_get_dynamic_volume_info);
       case 8: {
@@ -486,10 +486,10 @@ class Program {
   /// A valid camera except for its lens, which sometimes is valid too.
   void focus() {
     cumulet_camera* raw = nullptr;
-    told(cumulet_get_camera(viewer_.get(), &raw));
+    check(cumulet_get_camera(viewer_.get(), &raw));
     const CameraRef camera(raw);
     auto desc = cumulet::test::make_desc<cumulet_camera_desc>();
-    if (cumulet_camera_get(camera.get(), &desc) != CUMULET_OK) fail("a camera that cannot be told");
+    if (cumulet_camera_get(camera.get(), &desc) != CUMULET_OK) fail("a camera that cannot be read");
     const bool right = data_.ConsumeBool();
     desc.lens_radius = right ? data_.ConsumeFloatingPointInRange(0.0, 2.0) : bits<double>(number());
     desc.focus_distance = right ? data_.ConsumeFloatingPointInRange(0.0, 50.0) : bits<double>(number());
@@ -523,17 +523,17 @@ class Program {
         cumulet_sequence_get_time_of(sequence_.get(), frame, &seconds);
         return;
       case 4:
-        return told(cumulet_set_sequence(viewer_.get(), data_.ConsumeBool() ? sequence_.get() : nullptr));
+        return check(cumulet_set_sequence(viewer_.get(), data_.ConsumeBool() ? sequence_.get() : nullptr));
       case 5: {
         std::array<cumulet_sequence_info, 2> info{};
         info[0] = described<cumulet_sequence_info>();
         std::array<std::uint8_t, 4> states{};
-        return told(cumulet_get_sequence_info(viewer_.get(), info.data(), states.data(), states.size()));
+        return check(cumulet_get_sequence_info(viewer_.get(), info.data(), states.data(), states.size()));
       }
       case 6: {
         std::array<char, 64> cause{};
-        told(cumulet_get_sequence_frame(viewer_.get(), data_.ConsumeIntegralInRange(0U, 4U), cause.data(),
-                                        cause.size()));
+        check(cumulet_get_sequence_frame(viewer_.get(), data_.ConsumeIntegralInRange(0U, 4U), cause.data(),
+                                         cause.size()));
         if (cause.front() != '\0') check_line(cause.data());  // it failed, if a message was written
         return;
       }
@@ -581,13 +581,13 @@ class Program {
   template <class Desc, class Set>
   void set(Set function) {
     const auto desc = described<Desc>();
-    told(function(viewer_.get(), &desc));
+    check(function(viewer_.get(), &desc));
   }
   template <class Out, class Get>
   void get(Get function) {
     std::array<Out, 2> out{};  // struct_size may be slightly too large
     out[0] = described<Out>();
-    told(function(viewer_.get(), out.data()));
+    check(function(viewer_.get(), out.data()));
   }
 
   cumulet_frame_desc small_frame() {
@@ -603,15 +603,15 @@ class Program {
     const cumulet_frame_desc frame = small_frame();
     std::array<cumulet_warm_up_result, 2> result{};
     result[0] = described<cumulet_warm_up_result>();
-    told(cumulet_warm_up(viewer_.get(), &frame, static_cast<cumulet_warm_up_scope>(data_.ConsumeIntegralInRange(0, 2)),
-                         result.data()));
+    check(cumulet_warm_up(viewer_.get(), &frame, static_cast<cumulet_warm_up_scope>(data_.ConsumeIntegralInRange(0, 2)),
+                          result.data()));
   }
 
   void render() {
     const cumulet_frame_desc frame = small_frame();
     std::array<cumulet_frame_result, 2> result{};
     result[0] = described<cumulet_frame_result>();
-    told(cumulet_render(viewer_.get(), &frame, result.data()));
+    check(cumulet_render(viewer_.get(), &frame, result.data()));
   }
 
   void look() {
@@ -626,38 +626,38 @@ class Program {
         const auto name = [](void*, cumulet_object_kind kind, std::uint64_t, std::uint32_t) {
           return kind == CUMULET_OBJECT_GROUND ? nullptr : "object";
         };
-        return told(cumulet_read_cryptomatte(viewer_.get(), name, nullptr, data_.ConsumeIntegralInRange(0U, 17U),
-                                             values.data(), values.size()));
+        return check(cumulet_read_cryptomatte(viewer_.get(), name, nullptr, data_.ConsumeIntegralInRange(0U, 17U),
+                                              values.data(), values.size()));
       }
       case 8:
-        return told(cumulet_destroy_transmittance_map(viewer_.get(), data_.ConsumeIntegralInRange(0U, 17U)));
+        return check(cumulet_destroy_transmittance_map(viewer_.get(), data_.ConsumeIntegralInRange(0U, 17U)));
       case 7: {
         const auto desc = described<cumulet_transmittance_map_desc>();
         std::array<cumulet_transmittance_map, 2> map{};
         map[0] = described<cumulet_transmittance_map>();
-        return told(cumulet_update_transmittance_map(viewer_.get(), &desc, map.data()));
+        return check(cumulet_update_transmittance_map(viewer_.get(), &desc, map.data()));
       }
       case 5:
-        return told(cumulet_read_accumulation(viewer_.get(), bytes.data(), &room));
+        return check(cumulet_read_accumulation(viewer_.get(), bytes.data(), &room));
       case 6:
-        return told(cumulet_restore_accumulation(viewer_.get(), bytes.data(), bytes.size()));
+        return check(cumulet_restore_accumulation(viewer_.get(), bytes.data(), bytes.size()));
       case 0:
-        return told(cumulet_read_linear(viewer_.get(), values.data(), values.size()));
+        return check(cumulet_read_linear(viewer_.get(), values.data(), values.size()));
       case 1:
-        return told(cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()));
+        return check(cumulet_read_display(viewer_.get(), bytes.data(), bytes.size()));
       case 2:
-        return told(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 10)),
-                                     values.data(), values.size()));
+        return check(cumulet_read_aov(viewer_.get(), static_cast<cumulet_aov>(data_.ConsumeIntegralInRange(0, 10)),
+                                      values.data(), values.size()));
       case 3:
-        return told(cumulet_measure_noise(viewer_.get(), &noise));
+        return check(cumulet_measure_noise(viewer_.get(), &noise));
       default:
-        return told(cumulet_pick_at(viewer_.get(), bits<double>(number()), bits<double>(number()), pick.data()));
+        return check(cumulet_pick_at(viewer_.get(), bits<double>(number()), bits<double>(number()), pick.data()));
     }
   }
 
   void steer() {
     cumulet_camera* raw = nullptr;
-    told(cumulet_get_camera(viewer_.get(), &raw));
+    check(cumulet_get_camera(viewer_.get(), &raw));
     const CameraRef camera(raw);
     const double a = bits<double>(number());
     const double b = bits<double>(number());
@@ -705,7 +705,7 @@ class Program {
     }
     // In any state, it can be read and set again.
     auto told_desc = cumulet::test::make_desc<cumulet_camera_desc>();
-    if (cumulet_camera_get(camera.get(), &told_desc) != CUMULET_OK) fail("a camera that cannot be told");
+    if (cumulet_camera_get(camera.get(), &told_desc) != CUMULET_OK) fail("a camera that cannot be read");
     for (const double value : told_desc.eye) {
       if (value != value) fail("a camera at NaN");
     }
@@ -729,7 +729,7 @@ class Program {
       case 1:
         return look_at_progress();
       case 2:
-        return told(cumulet_get_bounds(viewer_.get(), low, high));
+        return check(cumulet_get_bounds(viewer_.get(), low, high));
       case 3: {
         std::array<cumulet_volume_info, 2> info{};
         info[0] = described<cumulet_volume_info>();
@@ -745,7 +745,7 @@ class Program {
         return;
       }
       default:
-        return told(cumulet_frame_all(viewer_.get()));
+        return check(cumulet_frame_all(viewer_.get()));
     }
   }
 
@@ -759,9 +759,9 @@ class Program {
       case 2:
         return make_triangles();
       case 3:
-        return told(cumulet_set_volume(viewer, volume_.get()));
+        return check(cumulet_set_volume(viewer, volume_.get()));
       case 4:
-        return told(cumulet_set_surfaces(viewer, surfaces_.get()));
+        return check(cumulet_set_surfaces(viewer, surfaces_.get()));
       case 5:
         return set<cumulet_grid_desc>(cumulet_set_grid);
       case 6:
@@ -779,7 +779,7 @@ class Program {
       case 12: {
         auto event = described<cumulet_event>();
         std::int32_t handled = 0;
-        return told(cumulet_input(viewer, &event, &handled));
+        return check(cumulet_input(viewer, &event, &handled));
       }
       case 13:
       case 14:
@@ -791,27 +791,27 @@ class Program {
       case 17:
         return ask();
       case 18:
-        return told(cumulet_wait(viewer, data_.ConsumeIntegralInRange(0, 20)));
+        return check(cumulet_wait(viewer, data_.ConsumeIntegralInRange(0, 20)));
       case 19:
         return cumulet_cancel(viewer);
       case 20:
-        return told(cumulet_rebuild(viewer));
+        return check(cumulet_rebuild(viewer));
       case 21:
         return warm_up();
       case 22:
-        return told(cumulet_use_surface_camera(viewer, data_.ConsumeIntegralInRange(0U, 2U)));
+        return check(cumulet_use_surface_camera(viewer, data_.ConsumeIntegralInRange(0U, 2U)));
       case 23: {
         std::array<float, 8> points{};
         for (float& one : points) one = data_.ConsumeFloatingPoint<float>();
         const auto which = static_cast<cumulet_ramp>(data_.ConsumeIntegralInRange(0U, 3U));
-        return told(cumulet_set_ramp(viewer, which, points.data(), data_.ConsumeIntegralInRange(0U, 4U)));
+        return check(cumulet_set_ramp(viewer, which, points.data(), data_.ConsumeIntegralInRange(0U, 4U)));
       }
       case 24:
         return make_environment();
       case 25:
-        return told(cumulet_set_environment(viewer, environment_.get()));
+        return check(cumulet_set_environment(viewer, environment_.get()));
       case 26:
-        return told(cumulet_load_environment(viewer, data_.ConsumeBool() ? "/dev/null" : "/dev/null/nowhere.exr"));
+        return check(cumulet_load_environment(viewer, data_.ConsumeBool() ? "/dev/null" : "/dev/null/nowhere.exr"));
       case 27:
         return set<cumulet_environment_settings_desc>(cumulet_set_environment_settings);
       case 28:
@@ -830,8 +830,8 @@ class Program {
       case 36:
         return set_transforms();
       default:
-        told(cumulet_detach(viewer));
-        if (draws_ && data_.ConsumeBool()) told(cumulet_attach(viewer, Context::get_proc, &context()));
+        check(cumulet_detach(viewer));
+        if (draws_ && data_.ConsumeBool()) check(cumulet_attach(viewer, Context::get_proc, &context()));
     }
   }
 

@@ -251,7 +251,7 @@ Cost NullDevice::cost_of(VkPipeline pipeline) const {
     cost.waves = values.at("Subgroups per SIMD") * (waves_of_32_ ? 32U : 64U) / executables[i].subgroupSize;
     return cost;
   }
-  throw std::runtime_error("the driver told nothing of the pipeline");
+  throw std::runtime_error("the driver reports nothing about the pipeline");
 }
 
 }  // namespace cumulet::gpu_cost

@@ -94,8 +94,8 @@ TEST(AdaptiveSampleCounts, PredictTheNumberOfSamples) {
   EXPECT_EQ(row.allotment().expected(100.0), 4 * 64 * 100.0);
   row.look(16.0);
   row.allotment().decide(row.errors(), 0.2, 16);
-  const double told = row.allotment().expected(1e6);
-  EXPECT_NEAR(row.run(0.2), told, 0.06 * told);
+  const double expected = row.allotment().expected(1e6);
+  EXPECT_NEAR(row.run(0.2), expected, 0.06 * expected);
 }
 
 TEST(AdaptiveSampleCounts, HalfABlockIsDecidedByTheOtherHalf) {

@@ -210,7 +210,7 @@ TEST_F(Contract, AccumulationContinuesInAnotherViewer) {
     bytes.resize(size);
     size -= 1;
     EXPECT_EQ(cumulet_read_accumulation(first.get(), bytes.data(), &size), CUMULET_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(size, bytes.size()) << "what it takes is told";
+    EXPECT_EQ(size, bytes.size()) << "the size that it needs is reported";
     ASSERT_EQ(cumulet_read_accumulation(first.get(), bytes.data(), &size), CUMULET_OK);
   }
   const ViewerPtr second = begun(1.0);

@@ -38,15 +38,15 @@ using cumulet::test::VolumeRef;
 // Coalescing and errors: UpdateCallback in robustness_test.cpp.
 TEST_F(Contract, Contract17UpdateCallbackReportsFinishedJobs) {
   std::atomic<int> updates = 0;
-  const ViewerPtr told =
+  const ViewerPtr notified =
       viewer({.update = [](void* user) { ++*static_cast<std::atomic<int>*>(user); }, .update_user = &updates});
   auto frame = target_.frame();
-  ASSERT_EQ(cumulet_render(told.get(), &frame, nullptr), CUMULET_OK);
+  ASSERT_EQ(cumulet_render(notified.get(), &frame, nullptr), CUMULET_OK);
   updates = 0;
-  ASSERT_EQ(cumulet_set_volume(told.get(), volume_.get()), CUMULET_OK);
+  ASSERT_EQ(cumulet_set_volume(notified.get(), volume_.get()), CUMULET_OK);
   EXPECT_GE(updates, 1);
-  ASSERT_EQ(cumulet_render(told.get(), &frame, nullptr), CUMULET_OK);
-  ASSERT_EQ(cumulet_wait(told.get(), -1.0), CUMULET_OK);
+  ASSERT_EQ(cumulet_render(notified.get(), &frame, nullptr), CUMULET_OK);
+  ASSERT_EQ(cumulet_wait(notified.get(), -1.0), CUMULET_OK);
   for (int i = 0; i < 1000 && updates < 2; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_GE(updates, 1);
   EXPECT_LE(updates, 2);
@@ -278,14 +278,14 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   struct Told {
     std::mutex mutex;
     std::vector<std::thread::id> threads;
-  } told;
+  } trace;
   auto desc = make_desc<cumulet_create_desc>();
   desc.trace = [](void* user, const char* name, double, double) {
     auto& t = *static_cast<Told*>(user);
     const std::scoped_lock lock(t.mutex);
     if (std::string(name) == "computing the sky") t.threads.push_back(std::this_thread::get_id());
   };
-  desc.trace_user = &told;
+  desc.trace_user = &trace;
   cumulet_viewer* raw = nullptr;
   ASSERT_EQ(cumulet_create(&desc, &raw, nullptr, 0), CUMULET_OK);
   ViewerPtr dragged(raw);
@@ -338,9 +338,9 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   EXPECT_EQ(difference(picture_of(raw, volume_.get(), target_), alone), "");
 
   dragged.reset();
-  EXPECT_FALSE(told.threads.empty());
-  EXPECT_LE(told.threads.size(), std::size_t{steps} + 4);
-  EXPECT_EQ(std::ranges::count(told.threads, std::this_thread::get_id()), 0);
+  EXPECT_FALSE(trace.threads.empty());
+  EXPECT_LE(trace.threads.size(), std::size_t{steps} + 4);
+  EXPECT_EQ(std::ranges::count(trace.threads, std::this_thread::get_id()), 0);
 }
 
 // Context loss at each call: ContextLossAt in robustness_test.cpp.

@@ -398,18 +398,18 @@ TEST_F(Contract, Contract07HostObjectsAreNotChanged) {
 }
 
 TEST_F(Contract, Contract08ErrorsAreCleanAndTheDebugCallbackIsTheHosts) {
-  int told = 0;
+  int messages = 0;
   const GLDEBUGPROC callback = [](GLenum, GLenum type, GLuint, GLenum, GLsizei, const GLchar*, const void* user) {
     if (type == GL_DEBUG_TYPE_ERROR) ++*static_cast<int*>(const_cast<void*>(user));
   };
   gl_.Enable(GL_DEBUG_OUTPUT);
   gl_.Enable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
-  gl_.DebugMessageCallback(callback, &told);
+  gl_.DebugMessageCallback(callback, &messages);
   gl_.Enable(GL_FLOAT);  // pending: INVALID_ENUM
-  const int own = told;
+  const int own = messages;
   picture_of(v_, volume_.get(), target_);
   EXPECT_EQ(gl_.GetError(), GLenum{GL_NO_ERROR});
-  EXPECT_EQ(told, own) << "errors of ours went to the host";
+  EXPECT_EQ(messages, own) << "errors of ours went to the host";
   auto frame = target_.frame();
   frame.framebuffer = 999;  // a failing call
   EXPECT_NE(cumulet_render(v_, &frame, nullptr), CUMULET_OK);
@@ -491,7 +491,7 @@ TEST_F(Contract, FramesPassesAndJobsAreReportedAtTheirEnd) {
   struct Told {
     std::mutex mutex;
     std::map<std::string, std::vector<std::pair<double, double>>> pieces;
-  } told;
+  } trace;
   auto desc = make_desc<cumulet_create_desc>();
   desc.get_proc = FakeGl::get_proc;
   desc.get_proc_user = &fake_;
@@ -501,19 +501,19 @@ TEST_F(Contract, FramesPassesAndJobsAreReportedAtTheirEnd) {
     t.pieces[name].emplace_back(begin, end);
     EXPECT_EQ(cumulet_rebuild(nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   };
-  desc.trace_user = &told;
+  desc.trace_user = &trace;
   cumulet_viewer* raw = nullptr;
   ASSERT_EQ(cumulet_create(&desc, &raw, nullptr, 0), CUMULET_OK);
   ViewerPtr viewer(raw);
   picture_of(viewer.get(), volume_.get(), target_);
   viewer.reset();
   for (const char* name : {"frame", "cumulet: upload", "cumulet: trace", "cumulet: draw", "building the grid"})
-    EXPECT_FALSE(told.pieces[name].empty()) << name;
+    EXPECT_FALSE(trace.pieces[name].empty()) << name;
   // Passes are nested in their frame.
-  const auto [begin, end] = told.pieces["cumulet: draw"].back();
+  const auto [begin, end] = trace.pieces["cumulet: draw"].back();
   EXPECT_LE(begin, end);
   EXPECT_TRUE(
-      std::ranges::any_of(told.pieces["frame"], [&](const auto& f) { return f.first <= begin && end <= f.second; }));
+      std::ranges::any_of(trace.pieces["frame"], [&](const auto& f) { return f.first <= begin && end <= f.second; }));
 }
 
 // tests/embed runs all example hosts. This test runs the smallest one, if it is built.
@@ -530,7 +530,7 @@ TEST(ContractHosts, Contract25TheSmallestHostRuns) {
   int status = 0;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 1) << "a file that is not there is told in a line";
+  EXPECT_EQ(WEXITSTATUS(status), 1) << "a file that is not there is reported in a line";
 }
 
 }  // namespace

@@ -23,14 +23,14 @@ using cumulet::test::ViewerPtr;
 /// Calls cumulet_warm_up until it is complete. Returns the reported progress.
 std::vector<double> warm_up(cumulet_viewer* viewer, const cumulet_frame_desc& frame,
                             cumulet_warm_up_scope scope = CUMULET_WARM_UP_SCENE) {
-  std::vector<double> told;
+  std::vector<double> progress;
   auto result = make_desc<cumulet_warm_up_result>();
   do {
     EXPECT_EQ(cumulet_warm_up(viewer, &frame, scope, &result), CUMULET_OK) << cumulet_last_error(viewer);
-    told.push_back(result.progress);
-  } while (result.incomplete != 0 && told.size() < 10000);
+    progress.push_back(result.progress);
+  } while (result.incomplete != 0 && progress.size() < 10000);
   EXPECT_EQ(result.incomplete, 0);
-  return told;
+  return progress;
 }
 
 TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
@@ -72,9 +72,9 @@ TEST_F(Contract, Contract26NothingIsCompiledInAFrameOnceWarm) {
       frame.format = GL_RGBA16F;
     }
     const Picture before = target_.pixels();
-    const std::vector<double> told = warm_up(own.get(), frame);
-    EXPECT_TRUE(std::ranges::is_sorted(told));
-    EXPECT_EQ(told.back(), 1.0);
+    const std::vector<double> progress = warm_up(own.get(), frame);
+    EXPECT_TRUE(std::ranges::is_sorted(progress));
+    EXPECT_EQ(progress.back(), 1.0);
     EXPECT_EQ(target_.pixels(), before) << "it draws nothing";
     auto stats = make_desc<cumulet_stats>();
     ASSERT_EQ(cumulet_get_stats(own.get(), &stats), CUMULET_OK);
@@ -236,11 +236,11 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
   ASSERT_EQ(cumulet_wait(own.get(), -1.0), CUMULET_OK);
   auto frame = target_.frame();
   auto result = make_desc<cumulet_warm_up_result>();
-  std::vector<double> told;
+  std::vector<double> progress;
   const auto step = [&](double budget_ms) {
     frame.budget_ms = budget_ms;
     const cumulet_status status = cumulet_warm_up(own.get(), &frame, CUMULET_WARM_UP_ALL, &result);
-    told.push_back(result.progress);
+    progress.push_back(result.progress);
     return status;
   };
   const auto run = [&](double budget_ms) {
@@ -263,10 +263,10 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
   fake_.fail_linking(true);
   for (const auto begun = linked(); linked() == begun;) ASSERT_EQ(step(1e-3), CUMULET_OK);
   fake_.fail_linking(false);
-  EXPECT_EQ(run(5.0), CUMULET_ERROR_GL) << "told in the end";
+  EXPECT_EQ(run(5.0), CUMULET_ERROR_GL) << "reported in the end";
   EXPECT_NE(std::string(cumulet_last_error(own.get())).find("does not build"), std::string::npos);
   EXPECT_GT(result.progress, 0.9);
-  EXPECT_TRUE(std::ranges::is_sorted(told));
+  EXPECT_TRUE(std::ranges::is_sorted(progress));
   // The error is returned again without another build. A changed setting allows one.
   const auto before = linked();
   EXPECT_EQ(run(5.0), CUMULET_ERROR_GL);

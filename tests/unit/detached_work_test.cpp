@@ -92,16 +92,16 @@ TEST(DetachedWork, ExcessWorkRunsOnTheCallersThread) {
   int left = 0;
   for (; at_once == 0 && left < 1000; ++left) {
     const auto here = std::this_thread::get_id();
-    auto told = std::make_shared<std::atomic<bool>>(false);
-    run_detached([&open, &done, told, here] {
+    auto on_this_thread = std::make_shared<std::atomic<bool>>(false);
+    run_detached([&open, &done, on_this_thread, here] {
       if (std::this_thread::get_id() == here) {
-        *told = true;
+        *on_this_thread = true;
       } else {
         open.wait();
       }
       ++done;
     });
-    if (*told) ++at_once;
+    if (*on_this_thread) ++at_once;
   }
   EXPECT_EQ(at_once, 1);
   EXPECT_GT(left, 2);

@@ -658,8 +658,8 @@ TEST_P(EmissionRendering, MieKeepsItsOwnAnisotropy) {
 
 // Frames of a sequence share one warning.
 TEST(AnisotropyField, UnsupportedFieldIsReportedOnce) {
-  std::vector<std::string> told;
-  viewer::Viewer viewer(Log([&](LogLevel, const char* message) { told.emplace_back(message); }), nullptr, true);
+  std::vector<std::string> warnings;
+  viewer::Viewer viewer(Log([&](LogLevel, const char* message) { warnings.emplace_back(message); }), nullptr, true);
   const auto show = [&] {
     VolumeFrame frame{.density = field(ivec3(8), ivec3(0), 1.0F)};
     frame.anisotropy = anisotropy(ivec3(8), ivec3(0), [](const ivec3& /*p*/) { return 0.5F; });
@@ -668,16 +668,16 @@ TEST(AnisotropyField, UnsupportedFieldIsReportedOnce) {
   viewer::Medium mie;
   mie.phase = scene::mie_phase(10.0F);
   show();
-  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(warnings.empty());
   for (int i = 0; i < 3; ++i) {
     viewer.set_medium(mie);
     show();
   }
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_NE(told[0].find("is ignored: the Mie phase function"), std::string::npos);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("is ignored: the Mie phase function"), std::string::npos);
   viewer.set_medium({});
   viewer.set_medium(mie);
-  EXPECT_EQ(told.size(), 2U);
+  EXPECT_EQ(warnings.size(), 2U);
 }
 
 // A small fire in thick smoke that is seen by the light it scatters. Scattered rays reach it rarely, NEE reaches it

@@ -132,7 +132,7 @@ class Equiangular : public test::ViewerTest {
     const Seen with = see({analytic_light_at(inside, 1e-4F)});
     for (int i = 0; i < 3; ++i) {
       const double error = std::hypot(without.error[i], with.error[i]);
-      ASSERT_GT(without.mean[i], 20.0 * error) << what << ": too much noise to tell";
+      ASSERT_GT(without.mean[i], 20.0 * error) << what << ": too much noise to compare";
       EXPECT_NEAR(with.mean[i], without.mean[i], 4.0 * error) << what << " " << i;
     }
     EXPECT_NE(with.variance, without.variance) << what;

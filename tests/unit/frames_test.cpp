@@ -260,7 +260,7 @@ TEST_F(FrameSelection, PatternSelectsAllExistingFrames) {
   ASSERT_EQ(said(), "");
   EXPECT_EQ(plan->analyzed_by, judged);
   ASSERT_EQ(plan->frames.size(), 2u);
-  EXPECT_EQ(plan->frames[1].volume, folder / "f.0009.vdb") << "missing, which its turn tells";
+  EXPECT_EQ(plan->frames[1].volume, folder / "f.0009.vdb") << "missing, which is reported in its turn";
 }
 
 TEST_F(FrameSelection, FileWithFramesSelectsItsNeighbors) {
@@ -353,7 +353,7 @@ TEST_F(FrameSelection, SubframesNeedBothFiles) {
   EXPECT_EQ(plan->frames[2].next->part, 5U);
   EXPECT_EQ(plan->frames[2].next->parts, 8U);
   EXPECT_EQ(plan->frames[3].volume, folder / "f.0014.vdb");
-  EXPECT_EQ(plan->frames[3].next->volume, folder / "f.0016.vdb") << "missing, which its turn tells";
+  EXPECT_EQ(plan->frames[3].next->volume, folder / "f.0016.vdb") << "missing, which is reported in its turn";
   options.frames = {{10, 333}};
   EXPECT_EQ(said(), "frame 10.333: the files are 2 frames apart, and this is not a multiple of 1/1000 of that");
 }

@@ -128,7 +128,7 @@ TEST(GltfFiles, ValidFilesLoadAndOthersAreReported) {
       EXPECT_EQ(test::broken(*scene), "");
       EXPECT_EQ(test::broken(*scene, scene->pose(0.5)), "");
       // An invalid model that is imported must cause a warning. Most show nothing at all.
-      EXPECT_TRUE(good || !lines.warnings.empty()) << "told of none:" << causes;
+      EXPECT_TRUE(good || !lines.warnings.empty()) << "reported none:" << causes;
     } catch (const Error& error) {
       EXPECT_FALSE(good) << error.what();
       EXPECT_TRUE(one_line(error.what())) << error.what();

@@ -96,8 +96,8 @@ TEST(Gltf, ExternalFilesAreRelativeToItAndPercentDecoded) {
                                                         {"data:;base64,AAAA", "has 3 bytes, not 36"}}) {
     json bad = whole;
     bad["buffers"][0]["uri"] = uri;
-    const std::string told = line(save(bad));
-    EXPECT_TRUE(has(told, cause)) << uri << ": " << told;
+    const std::string message = line(save(bad));
+    EXPECT_TRUE(has(message, cause)) << uri << ": " << message;
   }
   write(folder / "sub dir" / "a+b.bin", Bytes(10));
   EXPECT_TRUE(has(line(save(whole)), "has 10 bytes, not 36"));

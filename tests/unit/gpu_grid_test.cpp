@@ -201,8 +201,8 @@ TEST(GpuGridBuild, MediaShareALatticeUnlessTheCriterionDependsOnThem) {
 // bytes() does not block while a lattice is being made.
 TEST(GpuGridBuild, MemoryQueryDoesNotBlockDuringABuild) {
   const auto asset = std::make_shared<const viewer::VolumeAsset>(test::noise_volume({120, 110, 100}, glm::ivec3(0), 1));
-  int told = 0;
-  for (int i = 0; i < 10 && told == 0; ++i) {
+  int failures = 0;
+  for (int i = 0; i < 10 && failures == 0; ++i) {
     Progress progress;
     viewer::BuildSettings settings;
     settings.on = BuildOn::gpu;
@@ -217,10 +217,10 @@ TEST(GpuGridBuild, MemoryQueryDoesNotBlockDuringABuild) {
     while (progress.stage() != Progress::Stage::refining || (progress.fraction() == 0.0 && !made))
       std::this_thread::yield();
     EXPECT_GT(asset->bytes(), 1'000'000U);
-    if (!made) ++told;
+    if (!made) ++failures;
     maker.join();
   }
-  EXPECT_GT(told, 0);
+  EXPECT_GT(failures, 0);
 }
 
 // Data that does not depend on the view is computed once.

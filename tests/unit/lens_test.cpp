@@ -198,10 +198,10 @@ TEST_F(Lens, SurvivesHostMatrices) {
   constexpr cumulet_clip_space clip = CUMULET_CLIP_NEGATIVE_ONE_TO_ONE;
   ASSERT_EQ(cumulet_camera_get_matrices(camera_.get(), 1.0, clip, view.data(), projection.data()), CUMULET_OK);
   ASSERT_EQ(cumulet_camera_set_matrices(camera_.get(), view.data(), projection.data(), clip), CUMULET_OK);
-  auto told = make_desc<cumulet_camera_desc>();
-  ASSERT_EQ(cumulet_camera_get(camera_.get(), &told), CUMULET_OK);
-  EXPECT_EQ(told.lens_radius, 1.2);
-  EXPECT_EQ(told.focus_distance, 10.0);
+  auto read = make_desc<cumulet_camera_desc>();
+  ASSERT_EQ(cumulet_camera_get(camera_.get(), &read), CUMULET_OK);
+  EXPECT_EQ(read.lens_radius, 1.2);
+  EXPECT_EQ(read.focus_distance, 10.0);
   auto frame = target_.frame();
   frame.target = CUMULET_TARGET_NONE;
   converge(viewer_.get(), frame);

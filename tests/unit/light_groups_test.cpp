@@ -145,7 +145,7 @@ class LightGroups : public CViewerTest {
       const Mean a = mean_of(together.at(i));
       const Mean b = mean_of(alone);
       EXPECT_NEAR(a.value, b.value, 4.0 * std::hypot(a.error, b.error) + 1e-6) << what << ", group " << i;
-      EXPECT_GT(b.value, 20.0 * std::hypot(a.error, b.error)) << what << ", group " << i << ": the test can tell";
+      EXPECT_GT(b.value, 20.0 * std::hypot(a.error, b.error)) << what << ", group " << i << ": above the noise";
     }
     light();
   }

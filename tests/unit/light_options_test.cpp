@@ -72,23 +72,24 @@ TEST(Options, AnyWhiteSpaceSeparatesWords) {
 }
 
 TEST(Options, InvalidLightGivesAOneLineError) {
-  const auto told = [](const char* analytic_light) { return usage_error(with({"--light", analytic_light})); };
-  EXPECT_EQ(told(""), "--light: '' is not one of point, spot, disk, rect, distant");
-  EXPECT_EQ(told("bulb power=1"), "--light: 'bulb' is not one of point, spot, disk, rect, distant");
-  EXPECT_EQ(told("point power 1"), "--light: 'power' is not KEY=VALUE, such as power=100");
-  EXPECT_EQ(told("point watts=1"), "--light: lights have no setting 'watts'");
-  EXPECT_EQ(told("point kind=spot"), "--light: lights have no setting 'kind'");
-  EXPECT_EQ(told("point power=1 power=2"), "--light: power is given twice");
-  EXPECT_EQ(told("point power=-1"), "--light: power: '-1' is not from 0 to 1e30");
-  EXPECT_EQ(told("point power="), "--light: power: '' is not a finite number");
-  EXPECT_EQ(told("point position=1,2"), "--light: position: '1,2' is not 3 numbers separated by commas");
-  EXPECT_EQ(told("point position=1,2,1e31"), "--light: position exceeds 1e30");
-  EXPECT_EQ(told("point color=0,0,0"), "--light: color: '0,0,0' must not be black");
-  EXPECT_EQ(told("point color=1,-1,0"), "--light: color: '1,-1,0' has a negative number");
-  EXPECT_EQ(told("point color=1e20,1,0 power=1e20"), "--light: power times color exceeds 1e30");
-  EXPECT_EQ(told("disk width=0"), "--light: width: '0' is not above 0");
-  EXPECT_EQ(told("distant angle_degrees=100"), "--light: angle_degrees is above 90, the maximum for a distant light");
-  EXPECT_EQ(told("spot blend=2"), "--light: blend: '2' is not from 0 to 1");
+  const auto light_error = [](const char* analytic_light) { return usage_error(with({"--light", analytic_light})); };
+  EXPECT_EQ(light_error(""), "--light: '' is not one of point, spot, disk, rect, distant");
+  EXPECT_EQ(light_error("bulb power=1"), "--light: 'bulb' is not one of point, spot, disk, rect, distant");
+  EXPECT_EQ(light_error("point power 1"), "--light: 'power' is not KEY=VALUE, such as power=100");
+  EXPECT_EQ(light_error("point watts=1"), "--light: lights have no setting 'watts'");
+  EXPECT_EQ(light_error("point kind=spot"), "--light: lights have no setting 'kind'");
+  EXPECT_EQ(light_error("point power=1 power=2"), "--light: power is given twice");
+  EXPECT_EQ(light_error("point power=-1"), "--light: power: '-1' is not from 0 to 1e30");
+  EXPECT_EQ(light_error("point power="), "--light: power: '' is not a finite number");
+  EXPECT_EQ(light_error("point position=1,2"), "--light: position: '1,2' is not 3 numbers separated by commas");
+  EXPECT_EQ(light_error("point position=1,2,1e31"), "--light: position exceeds 1e30");
+  EXPECT_EQ(light_error("point color=0,0,0"), "--light: color: '0,0,0' must not be black");
+  EXPECT_EQ(light_error("point color=1,-1,0"), "--light: color: '1,-1,0' has a negative number");
+  EXPECT_EQ(light_error("point color=1e20,1,0 power=1e20"), "--light: power times color exceeds 1e30");
+  EXPECT_EQ(light_error("disk width=0"), "--light: width: '0' is not above 0");
+  EXPECT_EQ(light_error("distant angle_degrees=100"),
+            "--light: angle_degrees is above 90, the maximum for a distant light");
+  EXPECT_EQ(light_error("spot blend=2"), "--light: blend: '2' is not from 0 to 1");
 }
 
 }  // namespace

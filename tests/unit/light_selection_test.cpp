@@ -437,7 +437,7 @@ TEST_P(Sun, MultipleScatteringMatchesPlainPathTracing) {
     const auto [expected, error] = plainly_traced(dvec3(box.voxels), sigma, of.g, of.albedo, light);
     const double errors = std::sqrt(square / 256.0 + error * error);
     EXPECT_NEAR(mean, expected, 4.0 * errors);
-    EXPECT_LT(errors, 0.01 * expected) << "or it would tell nothing";
+    EXPECT_LT(errors, 0.01 * expected) << "else the comparison proves nothing";
   }
 }
 

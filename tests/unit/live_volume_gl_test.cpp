@@ -449,7 +449,7 @@ TEST_F(LiveStatesFromGl, NonFiniteValuesKeepTheLastValidState) {
         EXPECT_STREQ(cumulet_last_error(v_), "smoke: density: its voxel (3, 20, 11) is not finite");
         EXPECT_EQ(difference(target_.pixels(), before), "");
         const cumulet_frame_desc frame = target_.frame();
-        EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << "told once";
+        EXPECT_EQ(cumulet_render(v_, &frame, nullptr), CUMULET_OK) << "reported once";
         EXPECT_EQ(handed(), states);
       }
     }

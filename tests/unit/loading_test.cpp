@@ -83,9 +83,9 @@ class Loading : public testing::Test {
     SCOPED_TRACE(file);
     EXPECT_EQ(wait(), CUMULET_ERROR_FILE);
     EXPECT_NE(error().find(file), std::string::npos) << error();
-    const cumulet_progress told = progress();
-    EXPECT_EQ(told.status, CUMULET_ERROR_FILE);
-    EXPECT_EQ(told.message, error()) << "in one order";
+    const cumulet_progress reported = progress();
+    EXPECT_EQ(reported.status, CUMULET_ERROR_FILE);
+    EXPECT_EQ(reported.message, error()) << "in one order";
   }
   void expect_none() {
     EXPECT_EQ(wait(), CUMULET_OK) << error();
@@ -145,10 +145,10 @@ TEST_F(Loading, AnUnreportedFailureIsNotForgotten) {
   ASSERT_EQ(cumulet_load_environment(v_, "none.hdr"), CUMULET_OK);
   ASSERT_EQ(cumulet_load_volume(v_, "none.vdb", nullptr), CUMULET_OK);
   expect_reported("none.vdb");
-  const cumulet_progress told = progress();
-  EXPECT_EQ(told.volume_status, CUMULET_ERROR_FILE);
-  EXPECT_EQ(told.surfaces_status, CUMULET_ERROR_FILE);
-  EXPECT_EQ(told.environment_status, CUMULET_ERROR_FILE);
+  const cumulet_progress reported = progress();
+  EXPECT_EQ(reported.volume_status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(reported.surfaces_status, CUMULET_ERROR_FILE);
+  EXPECT_EQ(reported.environment_status, CUMULET_ERROR_FILE);
   ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
   expect_reported("none.hdr");
   ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
@@ -162,11 +162,11 @@ TEST_F(Loading, SettingAKindClearsItsFailure) {
     SCOPED_TRACE(file);
     EXPECT_EQ(set, CUMULET_OK);
     // Cleared by the call, without a wait.
-    const cumulet_progress told = progress();
-    EXPECT_EQ(told.status, CUMULET_OK) << told.message;
-    EXPECT_EQ(told.volume_status, CUMULET_OK);
-    EXPECT_EQ(told.surfaces_status, CUMULET_OK);
-    EXPECT_EQ(told.environment_status, CUMULET_OK);
+    const cumulet_progress reported = progress();
+    EXPECT_EQ(reported.status, CUMULET_OK) << reported.message;
+    EXPECT_EQ(reported.volume_status, CUMULET_OK);
+    EXPECT_EQ(reported.surfaces_status, CUMULET_OK);
+    EXPECT_EQ(reported.environment_status, CUMULET_OK);
     expect_none();
   };
   for (cumulet_volume* volume : {static_cast<cumulet_volume*>(nullptr), volume_.get()}) {
@@ -204,9 +204,9 @@ TEST_F(Loading, LiveVolumesAndInstancesReportFailuresAlike) {
   };
   const auto expect_too_large = [&] {
     EXPECT_EQ(wait(), CUMULET_ERROR_OUT_OF_MEMORY);
-    const cumulet_progress told = progress();
-    EXPECT_EQ(told.volume_status, CUMULET_ERROR_OUT_OF_MEMORY);
-    EXPECT_EQ(told.message, error());
+    const cumulet_progress reported = progress();
+    EXPECT_EQ(reported.volume_status, CUMULET_ERROR_OUT_OF_MEMORY);
+    EXPECT_EQ(reported.message, error());
   };
   const auto missing = make_sequence({"none.1.vdb"});
   auto desc = make_desc<cumulet_instance_desc>();

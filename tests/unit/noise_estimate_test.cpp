@@ -40,7 +40,7 @@ TEST_P(Noise, EstimateMatchesTheVarianceBetweenSeeds) {
   constexpr std::uint32_t seeds = 96;
   std::vector<double> sum(pixels);
   std::vector<double> square(pixels);
-  std::vector<double> told(pixels);  // squared error estimates
+  std::vector<double> estimated(pixels);  // squared error estimates
   for (std::uint32_t seed = 0; seed < seeds; ++seed) {
     const std::vector<double> bright = picture(16, seed);
     const std::vector<float> error = errors();
@@ -48,7 +48,7 @@ TEST_P(Noise, EstimateMatchesTheVarianceBetweenSeeds) {
     for (std::size_t i = 0; i < pixels; ++i) {
       sum[i] += bright[i];
       square[i] += bright[i] * bright[i];
-      told[i] += double(error[i]) * error[i] / seeds;
+      estimated[i] += double(error[i]) * error[i] / seeds;
       all += double(error[i]) * error[i];
     }
     // The image's noise is the root mean square of its pixels' errors, relative to the mean.
@@ -61,12 +61,12 @@ TEST_P(Noise, EstimateMatchesTheVarianceBetweenSeeds) {
   // In quarters of the pixels, ordered by error: from the sky, which has none, to the brightest parts of the cloud.
   std::vector<std::size_t> order(pixels);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, {}, [&](std::size_t i) { return told[i]; });
+  std::ranges::sort(order, {}, [&](std::size_t i) { return estimated[i]; });
   for (std::size_t quarter = 0; quarter < 4; ++quarter) {
     double estimate = 0.0;
     double truth = 0.0;
     for (std::size_t k = quarter * pixels / 4; k < (quarter + 1) * pixels / 4; ++k) {
-      estimate += told[order[k]];
+      estimate += estimated[order[k]];
       truth += truly[order[k]];
     }
     RecordProperty("ratio" + std::to_string(quarter), std::to_string(std::sqrt(truth / estimate)));
@@ -75,7 +75,7 @@ TEST_P(Noise, EstimateMatchesTheVarianceBetweenSeeds) {
     EXPECT_LT(truth, 1.08 * estimate + 1e-9) << quarter;
     EXPECT_GT(truth, 0.5 * estimate - 1e-9) << quarter;
   }
-  EXPECT_GT(told[order.back()], 10.0 * told[order[pixels / 4]]) << "not all the same";
+  EXPECT_GT(estimated[order.back()], 10.0 * estimated[order[pixels / 4]]) << "not all the same";
 }
 
 TEST_P(Noise, OneSampleHasNoErrorEstimate) {

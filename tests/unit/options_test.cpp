@@ -418,7 +418,7 @@ TEST(Options, NoiseAndTimeLimitsRaiseTheDefaultSampleLimit) {
 TEST(PictureMemory, InsufficientMemoryIsReportedBeforeRendering) {
   RenderOptions options = parse({"--size", "16384x16384"});
   constexpr std::uint64_t gib = std::uint64_t{1} << 30U;
-  const auto told = [&](std::string_view renderer, std::optional<std::uint64_t> available) -> std::string {
+  const auto warning_for = [&](std::string_view renderer, std::optional<std::uint64_t> available) -> std::string {
     try {
       check_memory(options, renderer, available);
     } catch (const std::runtime_error& error) {
@@ -427,19 +427,19 @@ TEST(PictureMemory, InsufficientMemoryIsReportedBeforeRendering) {
     return "";
   };
   // Memory of a software driver is main memory.
-  EXPECT_EQ(told("llvmpipe (LLVM 15.0.6, 256 bits)", 15 * gib),
+  EXPECT_EQ(warning_for("llvmpipe (LLVM 15.0.6, 256 bits)", 15 * gib),
             "an image of 16384x16384 needs 8.0 GiB of GPU memory and 11.0 GiB of main memory: 15.0 GiB of main "
             "memory are available, and this software driver uses main memory");
-  EXPECT_EQ(told("NVIDIA H100", 15 * gib), "");
-  EXPECT_NE(told("NVIDIA H100", 10 * gib), "");
-  EXPECT_EQ(told("llvmpipe", 64 * gib), "");
-  EXPECT_EQ(told("llvmpipe", std::nullopt), "");
+  EXPECT_EQ(warning_for("NVIDIA H100", 15 * gib), "");
+  EXPECT_NE(warning_for("NVIDIA H100", 10 * gib), "");
+  EXPECT_EQ(warning_for("llvmpipe", 64 * gib), "");
+  EXPECT_EQ(warning_for("llvmpipe", std::nullopt), "");
   options.format = OutputFormat::exr;
   options.aovs = {CUMULET_AOV_NORMAL};
   EXPECT_GT(picture_memory(options).main, 20 * gib);
   options = parse({});
   EXPECT_LT(picture_memory(options).main + picture_memory(options).gl, gib / 8);
-  EXPECT_EQ(told("llvmpipe", gib), "");
+  EXPECT_EQ(warning_for("llvmpipe", gib), "");
   EXPECT_GT(available_memory().value_or(gib), 0U);
 }
 
@@ -598,7 +598,7 @@ TEST(Options, OldFlagsAreAccepted) {
   struct Case {
     Arguments old;
     Arguments now;
-    std::string told;
+    std::string expected;
   };
   const std::string start = "cumulet-render: ";
   for (const Case& c :
@@ -622,11 +622,11 @@ TEST(Options, OldFlagsAreAccepted) {
         Case{{"--between", "blend"}, {"--frame-interpolation", "blend"}, "--between is now --frame-interpolation\n"}}) {
     testing::internal::CaptureStderr();
     const SceneOptions old = parse(c.old).scene;
-    EXPECT_EQ(testing::internal::GetCapturedStderr(), start + c.told);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), start + c.expected);
     testing::internal::CaptureStderr();
     const SceneOptions now = parse(c.now).scene;
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-    EXPECT_TRUE(same_scene(old, now)) << c.told;
+    EXPECT_TRUE(same_scene(old, now)) << c.expected;
   }
   testing::internal::CaptureStderr();
   EXPECT_EQ(parse({"--settled", "frames.txt"}).sequence_cache, "frames.txt");

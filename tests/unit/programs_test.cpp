@@ -102,13 +102,13 @@ TEST_F(ProgramsTest, FailedBuildIsReportedAndRetriedOnRequest) {
       return std::string();
     };
     fake_.fail_allocation(call + 1);
-    const std::string told = message();
+    const std::string first = message();
     fake_.fail_allocation(-1);
-    EXPECT_NE(told.find("resolve.comp"), std::string::npos) << told;
+    EXPECT_NE(first.find("resolve.comp"), std::string::npos) << warnings;
     EXPECT_EQ(programs.state(resolve), Program::State::failed);
     EXPECT_EQ(programs.counts().failed, 1U);
     const auto before = compiled();
-    EXPECT_EQ(message(), told);
+    EXPECT_EQ(message(), first);
     EXPECT_EQ(compiled(), before);
     programs.try_again();
     EXPECT_EQ(message(), "");
@@ -226,10 +226,10 @@ TEST_F(ProgramsTest, ShadersOfAFolderAreReloaded) {
     fs::last_write_time(file, before + std::chrono::seconds(2));
     std::this_thread::sleep_for(std::chrono::milliseconds(300));  // the interval at which it checks the folder
   };
-  std::vector<std::string> told;
+  std::vector<std::string> warnings;
   std::vector<std::string> read;
   const cumulet::Log log([&](cumulet::LogLevel level, const char* message) {
-    (level == cumulet::LogLevel::info ? read : told).emplace_back(message);
+    (level == cumulet::LogLevel::info ? read : warnings).emplace_back(message);
   });
   const auto programs = std::make_shared<Programs>(*gl_, nullptr, std::make_shared<gl::ShaderFolder>(folder_.path()));
   const Programs::Turn turn(programs, log);
@@ -250,9 +250,9 @@ TEST_F(ProgramsTest, ShadersOfAFolderAreReloaded) {
   programs->refresh();
   EXPECT_EQ(program.name(), second);
   EXPECT_EQ(programs->revision(), newer);
-  ASSERT_EQ(told.size(), 1U);
-  EXPECT_EQ(told[0].find('\n'), std::string::npos);
-  EXPECT_NE(told[0].find("resolve.comp"), std::string::npos);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].find('\n'), std::string::npos);
+  EXPECT_NE(warnings[0].find("resolve.comp"), std::string::npos);
   fs::remove(file);
   EXPECT_THROW(programs->get({"resolve.comp", {"CM_HOLES 1", "CM_BACKGROUND 0"}}), Error);
 }

@@ -324,7 +324,7 @@ TEST_F(OutOfMemory, WithoutStorageTheOldVolumeStays) {
   for (int i = 0; i < 5; ++i) {
     cumulet_status status = CUMULET_OK;
     EXPECT_EQ(difference(shown(host_, viewer_.get(), &status, 5.0), picture_a_), "");
-    EXPECT_EQ(status, CUMULET_OK) << "told again";
+    EXPECT_EQ(status, CUMULET_OK) << "reported again";
   }
   host_.fake.fail_storage(false);
   change_medium(viewer_.get(), 2.0);

@@ -17,7 +17,7 @@ namespace {
 
 using namespace cumulet::demo;
 using cumulet::test::error_of;
-using cumulet::test::told;
+using cumulet::test::section_error;
 using cumulet::test::with;
 
 SceneOptions full_scene() {
@@ -465,73 +465,79 @@ TEST(SceneFile, VersionThreeErrorsNameTheNewKey) {
             "dir/s.json: grid.type: 'fast' is not one of tetrahedral, dense, bricks");
   EXPECT_EQ(third(R"("lights": [{"kind": "disc"}])"), "dir/s.json: lights[0].kind: 'disc' is now 'disk'");
   // Versions 1 and 2 keep their names.
-  EXPECT_EQ(told(R"("grid": {"type": "dense"})"), "dir/s.json: grid.type: there is no such setting");
-  EXPECT_EQ(told(R"("grid": {"march": "bricks"})"), "dir/s.json: grid.march: 'bricks' is not one of tet, dense, brick");
-  EXPECT_EQ(told(R"("sun_sky": {})"), "dir/s.json: sun_sky: there is no such setting");
+  EXPECT_EQ(section_error(R"("grid": {"type": "dense"})"), "dir/s.json: grid.type: there is no such setting");
+  EXPECT_EQ(section_error(R"("grid": {"march": "bricks"})"),
+            "dir/s.json: grid.march: 'bricks' is not one of tet, dense, brick");
+  EXPECT_EQ(section_error(R"("sun_sky": {})"), "dir/s.json: sun_sky: there is no such setting");
 }
 
 TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   const std::string start = "dir/s.json: ";
-  EXPECT_EQ(told(R"("volumes": [{}, {}])"), start + "volumes[1].file: is missing");
-  EXPECT_EQ(told(R"("volumes": [{}, {"file": ""}])"), start + "volumes[1].file: is empty");
-  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb"}, 7])"), start + "volumes[2] is not an object");
-  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"albedo": 1}}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{}, {}])"), start + "volumes[1].file: is missing");
+  EXPECT_EQ(section_error(R"("volumes": [{}, {"file": ""}])"), start + "volumes[1].file: is empty");
+  EXPECT_EQ(section_error(R"("volumes": [{}, {"file": "a.vdb"}, 7])"), start + "volumes[2] is not an object");
+  EXPECT_EQ(section_error(R"("volumes": [{}, {"file": "a.vdb", "medium": {"albedo": 1}}])"),
             start + "volumes[1].medium.albedo: is not three numbers");
-  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"x": 1}}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{}, {"file": "a.vdb", "medium": {"x": 1}}])"),
             start + "volumes[1].medium.x: there is no such setting");
-  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "medium": {"max_bounces": 3}}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{}, {"file": "a.vdb", "medium": {"max_bounces": 3}}])"),
             start + "volumes[1].medium.max_bounces: can only be set for the first volume and applies to all");
-  EXPECT_EQ(told(R"("volumes": [{}, {"file": "a.vdb", "places": [7]}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{}, {"file": "a.vdb", "places": [7]}])"),
             start + "volumes[1].places[0]: is neither 16 numbers nor an object");
-  EXPECT_EQ(told(R"("models": [{}, {}, {}])"), start + "models[1].file: is missing");
-  EXPECT_EQ(told(R"("models": [{}, {"file": ""}])"), start + "models[1].file: is empty");
-  EXPECT_EQ(told(R"("models": [{}, {"file": "a.glb", "light": "none"}])"),
+  EXPECT_EQ(section_error(R"("models": [{}, {}, {}])"), start + "models[1].file: is missing");
+  EXPECT_EQ(section_error(R"("models": [{}, {"file": ""}])"), start + "models[1].file: is empty");
+  EXPECT_EQ(section_error(R"("models": [{}, {"file": "a.glb", "light": "none"}])"),
             start + "models[1].light: there is no such setting");
-  EXPECT_EQ(told(R"("models": [{"file": "a.glb", "translate": [1, 2]}])"),
+  EXPECT_EQ(section_error(R"("models": [{"file": "a.glb", "translate": [1, 2]}])"),
             start + "models[0].translate: is not three numbers");
-  EXPECT_EQ(told(R"("models": [{"file": "a.glb", "visible": false, "camera": 0}])"),
+  EXPECT_EQ(section_error(R"("models": [{"file": "a.glb", "visible": false, "camera": 0}])"),
             start + "models[0].camera: is only supported for a model without transform and name");
-  EXPECT_EQ(told(R"("models": [{"shadow_only": true}])"), start + "models[0].file: is missing");
-  EXPECT_EQ(told(R"("models": [{}, {"file": "a.glb", "scale": [1, 0, 1]}])").rfind(start + "models[1].scale: ", 0), 0U);
-  EXPECT_EQ(told(R"("volumes": {})"), start + "volumes: is not a list");
-  EXPECT_EQ(told(R"("volumes": [3])"), start + "volumes[0] is not an object");
-  EXPECT_EQ(told(R"("volumes": [{"visible": 0}])"), start + "volumes[0].visible: is neither true nor false");
-  EXPECT_EQ(told(R"("volumes": [{"medium": {"albedo": 1}}])"),
+  EXPECT_EQ(section_error(R"("models": [{"shadow_only": true}])"), start + "models[0].file: is missing");
+  EXPECT_EQ(
+      section_error(R"("models": [{}, {"file": "a.glb", "scale": [1, 0, 1]}])").rfind(start + "models[1].scale: ", 0),
+      0U);
+  EXPECT_EQ(section_error(R"("volumes": {})"), start + "volumes: is not a list");
+  EXPECT_EQ(section_error(R"("volumes": [3])"), start + "volumes[0] is not an object");
+  EXPECT_EQ(section_error(R"("volumes": [{"visible": 0}])"), start + "volumes[0].visible: is neither true nor false");
+  EXPECT_EQ(section_error(R"("volumes": [{"medium": {"albedo": 1}}])"),
             start + "volumes[0].medium.albedo: is not three numbers");
-  EXPECT_EQ(told(R"("volumes": [{"medium": {"density_ramp": [[1, 0], [0, 1]]}}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"medium": {"density_ramp": [[1, 0], [0, 1]]}}])"),
             start + "volumes[0].medium.density_ramp: has a point 0:1 whose input is not above that of 1:0");
-  EXPECT_EQ(told(R"("volumes": [{"medium": {"x": 1}}])"), start + "volumes[0].medium.x: there is no such setting");
-  EXPECT_EQ(told(R"("volumes": [{"to_world": [1]}])"), start + "volumes[0].to_world: is not 16 numbers");
-  EXPECT_EQ(told(R"("volumes": [{"scale": [1, 0, 1]}])"), start + "volumes[0].scale: 0 is not above 0");
-  EXPECT_EQ(told(R"("volumes": [{"to_world": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1], "scale": [1, 1, 1]}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"medium": {"x": 1}}])"),
+            start + "volumes[0].medium.x: there is no such setting");
+  EXPECT_EQ(section_error(R"("volumes": [{"to_world": [1]}])"), start + "volumes[0].to_world: is not 16 numbers");
+  EXPECT_EQ(section_error(R"("volumes": [{"scale": [1, 0, 1]}])"), start + "volumes[0].scale: 0 is not above 0");
+  EXPECT_EQ(section_error(R"("volumes": [{"to_world": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1], "scale": [1, 1, 1]}])"),
             start + "volumes[0].to_world: cannot be combined with translate, rotate_degrees or scale");
-  EXPECT_EQ(told(R"("volumes": [{"places": {}}])"), start + "volumes[0].places: is not a list");
-  EXPECT_EQ(told(R"("volumes": [{"places": []}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"places": {}}])"), start + "volumes[0].places: is not a list");
+  EXPECT_EQ(section_error(R"("volumes": [{"places": []}])"),
             start + "volumes[0].places: is empty: remove it for a single instance");
-  EXPECT_EQ(told(R"("volumes": [{"places": [{}, [1]]}])"), start + "volumes[0].places[1]: is not 16 numbers");
-  EXPECT_EQ(told(R"("volumes": [{"places": [7]}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"places": [{}, [1]]}])"), start + "volumes[0].places[1]: is not 16 numbers");
+  EXPECT_EQ(section_error(R"("volumes": [{"places": [7]}])"),
             start + "volumes[0].places[0]: is neither 16 numbers nor an object");
-  EXPECT_EQ(told(R"("volumes": [{"places": [{"scale": [1, 0, 1]}]}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"places": [{"scale": [1, 0, 1]}]}])"),
             start + "volumes[0].places[0].scale: 0 is not above 0");
-  EXPECT_EQ(told(R"("volumes": [{"places": [{"move": 1}]}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"places": [{"move": 1}]}])"),
             start + "volumes[0].places[0].move: there is no such setting");
-  EXPECT_EQ(told(R"("volume": {})"), start + "volume: there is no such setting");
-  EXPECT_EQ(told(R"("light": {})"), start + "light: there is no such setting");
-  EXPECT_EQ(told(R"("models": [{"light": "x"}])").rfind(start + "models[0].light: ", 0), 0u);
-  EXPECT_EQ(told(R"("environment": {"sun": {"irradiance": 1}})"),
+  EXPECT_EQ(section_error(R"("volume": {})"), start + "volume: there is no such setting");
+  EXPECT_EQ(section_error(R"("light": {})"), start + "light: there is no such setting");
+  EXPECT_EQ(section_error(R"("models": [{"light": "x"}])").rfind(start + "models[0].light: ", 0), 0u);
+  EXPECT_EQ(section_error(R"("environment": {"sun": {"irradiance": 1}})"),
             start + "environment.sun.irradiance: is not three numbers");
-  EXPECT_EQ(told(R"("lights": 1)"), start + "lights: is not a list");
-  EXPECT_EQ(told(R"("lights": [{}])"), start + "lights[0].kind: is missing");
-  EXPECT_EQ(told(R"("lights": [{"kind": "point"}, 1])"), start + "lights[1] is not an object");
-  EXPECT_EQ(told(R"("lights": [{"kind": "cube"}])"),
+  EXPECT_EQ(section_error(R"("lights": 1)"), start + "lights: is not a list");
+  EXPECT_EQ(section_error(R"("lights": [{}])"), start + "lights[0].kind: is missing");
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "point"}, 1])"), start + "lights[1] is not an object");
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "cube"}])"),
             start + "lights[0].kind: 'cube' is not one of point, spot, disc, rectangle, sun");
-  EXPECT_EQ(told(R"("lights": [{"kind": "point", "watts": 1}])"), start + "lights[0].watts: there is no such setting");
-  EXPECT_EQ(told(R"("lights": [{"kind": "point", "power": -1}])"), start + "lights[0].power: -1 is not from 0 to 1e30");
-  EXPECT_EQ(told(R"("lights": [{"kind": "sun", "angle_degrees": 91}])"),
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "point", "watts": 1}])"),
+            start + "lights[0].watts: there is no such setting");
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "point", "power": -1}])"),
+            start + "lights[0].power: -1 is not from 0 to 1e30");
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "sun", "angle_degrees": 91}])"),
             start + "lights[0].angle_degrees: is above 90, the maximum for a distant light");
-  EXPECT_EQ(told(R"("lights": [{"kind": "point", "position": [0, 1e31, 0]}])"),
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "point", "position": [0, 1e31, 0]}])"),
             start + "lights[0].position: exceeds 1e30");
-  EXPECT_EQ(told(R"("lights": [{"kind": "point", "color": [1e20, 1, 1], "power": 1e20}])"),
+  EXPECT_EQ(section_error(R"("lights": [{"kind": "point", "color": [1e20, 1, 1], "power": 1e20}])"),
             start + "lights[0].power: times color exceeds 1e30");
   EXPECT_EQ(error_of(R"({"cumulet_scene": 4})"),
             start + "cumulet_scene: version 4 is not supported: this program reads 1 to 3");

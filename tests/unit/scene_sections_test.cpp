@@ -15,7 +15,7 @@ namespace {
 
 using namespace cumulet::demo;
 using cumulet::test::error_of;
-using cumulet::test::told;
+using cumulet::test::section_error;
 using cumulet::test::with;
 
 TEST(SceneFile, TransformIsAMatrixOrTranslationRotationScale) {
@@ -71,13 +71,13 @@ TEST(SceneFile, MotionRoundTrips) {
     change(other);
     EXPECT_FALSE(same_scene(scene, other));
   }
-  EXPECT_EQ(told(R"("camera": {"open": {"eye": [1, 2, 3], "target": [0, 0, 0]}})"),
+  EXPECT_EQ(section_error(R"("camera": {"open": {"eye": [1, 2, 3], "target": [0, 0, 0]}})"),
             "dir/s.json: camera.open: needs a camera with eye and target");
-  EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"orthographic_height": 3}})"),
+  EXPECT_EQ(section_error(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"orthographic_height": 3}})"),
             "dir/s.json: camera.close.orthographic_height: has another projection than the camera");
-  EXPECT_EQ(told(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"lens_radius": 3}})"),
+  EXPECT_EQ(section_error(R"("camera": {"eye": [1, 2, 3], "target": [0, 0, 0], "close": {"lens_radius": 3}})"),
             "dir/s.json: camera.close.lens_radius: there is no such setting");
-  EXPECT_EQ(told(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
+  EXPECT_EQ(section_error(R"("volumes": [{"file": "a.vdb", "open": {"turn": 3}}])"),
             "dir/s.json: volumes[0].open.turn: there is no such setting");
   // Shutter transforms are relative to the instance transform.
   double to_world[16] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 5, 6, 7, 1};
@@ -150,19 +150,21 @@ TEST(SceneFile, CamerasRoundTrip) {
 
 TEST(SceneFile, CameraNamesAreUnique) {
   const std::string two = R"("cameras": [{"name": "a"}, {"name": "b"}], )";
-  EXPECT_EQ(told(two + R"("camera": "c")"), R"(dir/s.json: camera: no camera "c"; the scene has "a", "b")");
-  EXPECT_EQ(told(R"("camera": "c")"), R"(dir/s.json: camera: no camera "c"; the scene has none)");
-  EXPECT_EQ(told(R"("cameras": [{"name": "a"}, {"name": "b"}, {"name": "a"}])"),
+  EXPECT_EQ(section_error(two + R"("camera": "c")"), R"(dir/s.json: camera: no camera "c"; the scene has "a", "b")");
+  EXPECT_EQ(section_error(R"("camera": "c")"), R"(dir/s.json: camera: no camera "c"; the scene has none)");
+  EXPECT_EQ(section_error(R"("cameras": [{"name": "a"}, {"name": "b"}, {"name": "a"}])"),
             R"(dir/s.json: cameras[2].name: "a" is also the name of another camera)");
-  EXPECT_EQ(told(R"("cameras": [{}])"), "dir/s.json: cameras[0].name: is missing");
-  EXPECT_EQ(told(R"("cameras": [{"name": ""}])"), "dir/s.json: cameras[0].name: is empty");
-  EXPECT_EQ(told(R"("cameras": [{"name": 1}])"), "dir/s.json: cameras[0].name: is not a string");
-  EXPECT_EQ(told(R"("cameras": ["a"])"), "dir/s.json: cameras[0] is not an object");
-  EXPECT_EQ(told(R"("cameras": {})"), "dir/s.json: cameras: is not a list");
-  EXPECT_EQ(told(R"("camera": 1)"), "dir/s.json: camera is not an object");
-  EXPECT_EQ(told(R"("cameras": [{"name": "a", "eye": [0, 0, 1]}])"), "dir/s.json: cameras[0].target: is missing");
-  EXPECT_EQ(told(R"("cameras": [{"name": "a", "fovy": 1}])"), "dir/s.json: cameras[0].fovy: there is no such setting");
-  EXPECT_EQ(told(R"("cameras": [{"name": "a", "open": {"fovy_degrees": 3}}])"),
+  EXPECT_EQ(section_error(R"("cameras": [{}])"), "dir/s.json: cameras[0].name: is missing");
+  EXPECT_EQ(section_error(R"("cameras": [{"name": ""}])"), "dir/s.json: cameras[0].name: is empty");
+  EXPECT_EQ(section_error(R"("cameras": [{"name": 1}])"), "dir/s.json: cameras[0].name: is not a string");
+  EXPECT_EQ(section_error(R"("cameras": ["a"])"), "dir/s.json: cameras[0] is not an object");
+  EXPECT_EQ(section_error(R"("cameras": {})"), "dir/s.json: cameras: is not a list");
+  EXPECT_EQ(section_error(R"("camera": 1)"), "dir/s.json: camera is not an object");
+  EXPECT_EQ(section_error(R"("cameras": [{"name": "a", "eye": [0, 0, 1]}])"),
+            "dir/s.json: cameras[0].target: is missing");
+  EXPECT_EQ(section_error(R"("cameras": [{"name": "a", "fovy": 1}])"),
+            "dir/s.json: cameras[0].fovy: there is no such setting");
+  EXPECT_EQ(section_error(R"("cameras": [{"name": "a", "open": {"fovy_degrees": 3}}])"),
             "dir/s.json: cameras[0].open: needs a camera with eye and target");
   EXPECT_EQ(error_of(with(R"("cameras": [{"name": "a"}])")), "dir/s.json: cameras: there is no such setting");
   EXPECT_EQ(error_of(with(R"("camera": "a")")), "dir/s.json: camera is not an object");

@@ -172,12 +172,12 @@ TEST(Settings, SceneFilesRoundTripEachSetting) {
 TEST(Settings, DocumentationListsExactlyTheKeys) {
   std::ifstream file(CUMULET_DOCS "/scene_file.md");
   ASSERT_TRUE(file.is_open());
-  std::set<std::string> told;
+  std::set<std::string> documented;
   for (std::string line; std::getline(file, line);) {
     if (line.rfind("| `", 0) != 0) continue;
     std::istringstream parts(line.substr(2, line.find('|', 2) - 2));
     for (std::string key; std::getline(parts, key, '`');)
-      if (key.find('.') != std::string::npos) told.insert(key);
+      if (key.find('.') != std::string::npos) documented.insert(key);
   }
   std::set<std::string> keys = {"volume.file",
                                 "volume.grid",
@@ -213,7 +213,7 @@ TEST(Settings, DocumentationListsExactlyTheKeys) {
     });
   });
   for (const settings::RampInfo& ramp : settings::ramps) keys.insert(ramp.key);
-  EXPECT_EQ(told, keys);
+  EXPECT_EQ(documented, keys);
 }
 
 TEST(Aovs, HeaderAndDocumentationListExactlyTheTable) {
@@ -227,15 +227,15 @@ TEST(Aovs, HeaderAndDocumentationListExactlyTheTable) {
   EXPECT_EQ(constants, settings::aovs.size());
   std::ifstream page(CUMULET_DOCS "/aovs.md");
   ASSERT_TRUE(page.is_open());
-  std::set<std::string> told;
+  std::set<std::string> documented;
   for (std::string line; std::getline(page, line) && !line.starts_with("## ");) {
-    if (line.starts_with("| `")) told.insert(line.substr(3, line.find('`', 3) - 3));
+    if (line.starts_with("| `")) documented.insert(line.substr(3, line.find('`', 3) - 3));
   }
   for (const std::string_view name : {"denoised", "Combined_NAME", "CryptoObject00"})
-    EXPECT_EQ(told.erase(std::string(name)), 1U) << name;
+    EXPECT_EQ(documented.erase(std::string(name)), 1U) << name;
   std::set<std::string> names;
   for (const settings::Aov& aov : settings::named_aovs) names.emplace(aov.name);
-  EXPECT_EQ(told, names);
+  EXPECT_EQ(documented, names);
 }
 
 TEST(Settings, EachSettingHasAFlag) {

@@ -462,12 +462,12 @@ TEST_P(ViewerSlab, WritesDepthForTheHost) {
 TEST_P(ViewerSlab, NoiseEstimateMatchesTheVarianceBetweenSeeds) {
   viewer().set_medium({0.1, vec3(0.9F), {0.0F}, 0});
   std::vector<std::vector<float>> pictures;
-  double told = 0.0;
+  double estimate = 0.0;
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
     viewer().set_sampling({32, seed, {render::View::shaded, false}});
     converge(frame(24, 24));
     pictures.push_back(read({24, 24}));
-    told += viewer().measure_noise().value() / 12.0;
+    estimate += viewer().measure_noise().value() / 12.0;
   }
   double variance = 0.0;
   double mean = 0.0;
@@ -488,8 +488,8 @@ TEST_P(ViewerSlab, NoiseEstimateMatchesTheVarianceBetweenSeeds) {
   }
   const double seen = std::sqrt(variance) / mean;
   // Stratified samples have a slightly lower error than estimated from their variance.
-  EXPECT_LT(seen, 1.1 * told);
-  EXPECT_GT(seen, 0.6 * told);
+  EXPECT_LT(seen, 1.1 * estimate);
+  EXPECT_GT(seen, 0.6 * estimate);
 }
 
 CUMULET_ON_BACKENDS(ViewerFrames);

@@ -160,30 +160,31 @@ TEST_F(VolumeFrameImport, ColorFromAVectorGrid) {
 
 // Velocities are listed as such in every form, and are never used as density.
 TEST_F(VolumeFrameImport, VelocityGridsAreRecognized) {
-  const auto told = [&](const openvdb::GridPtrVec& grids) {
+  const auto channels_of = [&](const openvdb::GridPtrVec& grids) {
     return cumulet::volume::channels_by_name(cumulet::volume::list_grids(write(grids)));
   };
   using Channels = std::vector<std::string>;
   for (const char* name : {"vel", "V", "velocity"})
-    EXPECT_EQ(told({colors(name), two_voxels("density", 1.0F)}), (Channels{"velocity", "density"})) << name;
+    EXPECT_EQ(channels_of({colors(name), two_voxels("density", 1.0F)}), (Channels{"velocity", "density"})) << name;
   auto staggered = colors("motion");
   staggered->setGridClass(openvdb::GRID_STAGGERED);
-  EXPECT_EQ(told({staggered, colors("Cd"), two_voxels("soot", 1.0F)}), (Channels{"velocity", "color", "density"}));
+  EXPECT_EQ(channels_of({staggered, colors("Cd"), two_voxels("soot", 1.0F)}),
+            (Channels{"velocity", "color", "density"}));
   for (const std::string name : {"vel", "vel.", "v_", "Velocity_"}) {
     const openvdb::GridPtrVec parts{two_voxels(name + "x", 3.0F), two_voxels(name + "y", 3.0F),
                                     two_voxels(name + "z", 3.0F)};
     openvdb::GridPtrVec grids = parts;
     grids.push_back(two_voxels("other", 1.0F));
-    EXPECT_EQ(told(grids), (Channels{"velocity", "velocity", "velocity", "density"})) << name;
+    EXPECT_EQ(channels_of(grids), (Channels{"velocity", "velocity", "velocity", "density"})) << name;
     Messages messages;
     EXPECT_EQ(import_frame(write(grids), {}, messages.log).density.name, "other");
     EXPECT_TRUE(messages.warnings.empty()) << "there is nothing else to show";
-    EXPECT_EQ(told(parts), (Channels(3, "velocity")));
+    EXPECT_EQ(channels_of(parts), (Channels(3, "velocity")));
     EXPECT_HAS(refusal(write(parts), {}), "no scalar fog volume");
   }
-  EXPECT_EQ(told({two_voxels("v", 1.0F), two_voxels("velx", 1.0F)}), (Channels{"density", ""}))
+  EXPECT_EQ(channels_of({two_voxels("v", 1.0F), two_voxels("velx", 1.0F)}), (Channels{"density", ""}))
       << "numbers, and one of three";
-  EXPECT_EQ(told({two_voxels("v_x", 1.0F), two_voxels("v_x", 1.0F), two_voxels("v_y", 1.0F)}),
+  EXPECT_EQ(channels_of({two_voxels("v_x", 1.0F), two_voxels("v_x", 1.0F), two_voxels("v_y", 1.0F)}),
             (Channels{"density", "", ""}))
       << "no z";
 }

@@ -608,26 +608,26 @@ TEST_F(VolumeImport, DamagedCompressedLengthsAreReported) {
     out.setCompression(compression);
     out.write({grid, vectors});
     const std::string whole = bytes_of(path("packed.vdb"));
-    int told = 0;
+    int found = 0;
     for (std::size_t at = 200; at + 8 < whole.size(); ++at) {
       std::int64_t length = 0;
       std::memcpy(&length, whole.data() + at, sizeof length);
       // Lengths are in front of bytes that look like the start of zlib or Blosc data.
       const char first = compression == openvdb::io::COMPRESS_ZIP ? '\x78' : '\x02';
-      if (length < 17 || length > 200'000 || whole[at + 8] != first || told > 5) continue;
+      if (length < 17 || length > 200'000 || whole[at + 8] != first || found > 5) continue;
       for (const std::int64_t wrong : {std::int64_t{-300'000}, std::int64_t{1} << 50U, length + 1}) {
         std::string bytes = whole;
         std::memcpy(bytes.data() + at, &wrong, sizeof wrong);
         try {
           cumulet::volume::Inspection inspection(write_bytes(bytes, "damaged.vdb"));
           for (std::size_t i = 0; i < inspection.grids().size(); ++i) {
-            if (inspection.statistics(i).refusal.find("wrong size of compressed values") != std::string::npos) ++told;
+            if (inspection.statistics(i).refusal.find("wrong size of compressed values") != std::string::npos) ++found;
           }
         } catch (const cumulet::Error&) {  // the patched bytes were another field of the file
         }
       }
     }
-    EXPECT_GT(told, 5);
+    EXPECT_GT(found, 5);
   }
 }
 

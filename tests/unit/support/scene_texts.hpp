@@ -25,6 +25,8 @@ inline std::string error_of(const std::string& text) {
 inline std::string with(const std::string& more) { return R"({"cumulet_scene": 1, )" + more + "}"; }
 
 /// The error message for a scene of version 2 with these sections.
-inline std::string told(const std::string& sections) { return error_of(R"({"cumulet_scene": 2, )" + sections + "}"); }
+inline std::string section_error(const std::string& sections) {
+  return error_of(R"({"cumulet_scene": 2, )" + sections + "}");
+}
 
 }  // namespace cumulet::test
