@@ -104,7 +104,7 @@ TEST_F(ProgramsTest, FailedBuildIsReportedAndRetriedOnRequest) {
     fake_.fail_allocation(call + 1);
     const std::string first = message();
     fake_.fail_allocation(-1);
-    EXPECT_NE(first.find("resolve.comp"), std::string::npos) << warnings;
+    EXPECT_NE(first.find("resolve.comp"), std::string::npos) << first;
     EXPECT_EQ(programs.state(resolve), Program::State::failed);
     EXPECT_EQ(programs.counts().failed, 1U);
     const auto before = compiled();
