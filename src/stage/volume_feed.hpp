@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -62,6 +63,11 @@ class VolumeFeed {
   [[nodiscard]] const std::optional<Built>& built() const { return built_; }
   /// Frame or state of that grid; nullopt: none.
   [[nodiscard]] const std::optional<scene::SequenceFrame>& frame() const { return frame_; }
+  /// Returns the frame or state of this feed among those that are displayed; nullopt: none.
+  [[nodiscard]] std::optional<scene::SequenceFrame> find_in(const scene::SequenceFrames& displayed) const {
+    const auto found = std::ranges::find(displayed, id_, &scene::SequenceFrame::sequence);
+    return found == displayed.end() ? std::nullopt : std::optional(*found);
+  }
   /// True if a frame has rendered it.
   [[nodiscard]] bool is_rendered() const { return is_rendered_; }
   void note_rendered() { is_rendered_ = true; }

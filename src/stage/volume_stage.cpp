@@ -723,6 +723,16 @@ void VolumeStage::note_rendered() {
   for (const VolumeFeedPtr& feed : feeds_) feed->note_rendered();
 }
 
+void VolumeStage::note_displayed(const scene::SequenceFrames& shown) {
+  const auto note = [&](const VolumeFeedPtr& feed) {
+    DynamicFeed* live = as_dynamic(feed);
+    if (live == nullptr) return;
+    if (const auto frame = live->find_in(shown)) live->note_displayed(*frame);
+  };
+  note(feed_);
+  std::ranges::for_each(feeds_, note);
+}
+
 void VolumeStage::take_gl_bytes(std::uint64_t beside_volumes) {
   // Requests made before the first frame did not include the memory of images.
   if (budget_.set_bytes_beside(beside_volumes)) requests_due_ = requests_due_ || !shown_.empty();

@@ -62,6 +62,7 @@ class VolumeStage {
   void set_transforms(const std::vector<scene::InstanceTransform>& transforms);
   void set_previous_transforms(std::vector<scene::InstanceTransform> transforms) {
     previous_transforms_ = std::move(transforms);
+    host_.touch();
   }
   void add_instance(std::shared_ptr<Instance> instance, std::uint64_t id);
   void remove_instance(const Instance& instance);
@@ -92,10 +93,6 @@ class VolumeStage {
   /// Also throw Error(invalid_argument) for an instance that is not shown.
   [[nodiscard]] const SequenceFeed& sequence_of(const Instance& instance);
   [[nodiscard]] const DynamicFeed& live_of(const Instance& instance);
-  /// The feed shown instead of a volume; null: none.
-  [[nodiscard]] const VolumeFeedPtr& feed() const { return feed_; }
-  /// Feeds of instances: sequences, then dynamic volumes.
-  [[nodiscard]] const std::vector<VolumeFeedPtr>& feeds() const { return feeds_; }
   /// Returns the host's tag of an instance; nullopt if it is not shown.
   [[nodiscard]] std::optional<std::uint64_t> tag_of(std::uint64_t id) const;
   [[nodiscard]] GridTotals totals() const;
@@ -134,6 +131,8 @@ class VolumeStage {
 
   /// Marks all frames and states taken last as rendered.
   void note_rendered();
+  /// Records the frames and states that are displayed.
+  void note_displayed(const scene::SequenceFrames& shown);
   /// Takes the GPU memory used by everything except volumes in this frame.
   void take_gl_bytes(std::uint64_t beside_volumes);
   /// Takes newest states although the previous ones have not been displayed.
@@ -305,8 +304,8 @@ class VolumeStage {
   bool requests_due_ = false;   // the requests for grids are outdated
   bool waits_for_own_ = false;  // an instance waits for the volume's own grid, which is being built
   ViewTrack track_;
-  VolumeFeedPtr feed_;
-  std::vector<VolumeFeedPtr> feeds_;
+  VolumeFeedPtr feed_;                // shown instead of a volume; null: none
+  std::vector<VolumeFeedPtr> feeds_;  // of instances: sequences, then dynamic volumes
   FeedNumbers numbers_;
   std::size_t changed_instances_ = 0;
 };
