@@ -16,7 +16,9 @@
 #include "base/log.hpp"
 #include "jobs/jobs.hpp"
 #include "scene/snapshot.hpp"
+#include "stage/asset_feed.hpp"
 #include "stage/dynamic_feed.hpp"
+#include "stage/file_feed.hpp"
 #include "stage/gl_budget.hpp"
 #include "stage/sequence_feed.hpp"
 #include "stage/settings.hpp"
@@ -81,8 +83,8 @@ class VolumeStage {
   /// Metadata of the volume or the sequence.
   [[nodiscard]] const VolumeInfoPtr& volume_info() const { return volume_info_; }
   /// Metadata of the displayed volume: that of the proxy while there is one.
-  [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy_ ? proxy_->volume_info : volume_info_; }
-  [[nodiscard]] bool shows_proxy() const { return proxy_.has_value(); }
+  [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy() ? proxy()->volume_info : volume_info_; }
+  [[nodiscard]] bool shows_proxy() const { return proxy() != nullptr; }
   [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return transforms_; }
   [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   [[nodiscard]] const Medium& medium() const { return medium_; }
@@ -200,6 +202,13 @@ class VolumeStage {
     std::uint64_t last_taken = 0;
   };
 
+  // True if a sequence or a dynamic volume is shown instead of a volume.
+  [[nodiscard]] bool plays() const { return feed_ && as_asset(feed_) == nullptr; }
+  // The proxy of a volume that is being loaded, which is shown instead of the volume and of its predecessor; null:
+  // none.
+  [[nodiscard]] const Proxy* proxy() const { return file_ && file_->proxy() ? &*file_->proxy() : nullptr; }
+  // Shows the volume of file_, which has been read.
+  void show_file();
   // Updates the request of the viewer's own feed and takes its results.
   void follow_feed();
   void take_from_feed(bool is_seen);
@@ -213,7 +222,7 @@ class VolumeStage {
   // Requests a rebuild if the limits allow more cells or fewer cells than the grid has.
   void fit_cells();
   void drop_proxy();
-  // Stops showing a sequence or a dynamic volume.
+  // Stops following the viewer's own feed.
   void leave_feed();
   // Returns true if the state or frame taken last has been displayed, or if images are not being displayed at all.
   [[nodiscard]] bool is_seen(const VolumeFeed& feed) const;
@@ -221,15 +230,18 @@ class VolumeStage {
   bool begin_anew(bool shows, bool showed);
   // Makes this the current volume; null: none.
   void take_volume(VolumeAssetPtr volume);
-  // Sets the medium's density scale to the suggested one. Called with the first grid built for it.
+  // Sets the medium's density scale to the one that the feed suggests. Called with the first grid built for it.
   void take_suggestion();
   // Requests new grids. concerned: if set, a volume for which it returns false keeps its grid.
   void request_build(bool (*concerned)(const VolumeAsset&) = nullptr);
-  // Copies the medium and the ramps to the build settings.
-  void take_medium();
+  // Copies the medium and the ramps to the build settings, with the density scale of coming grids or with this one.
+  void take_medium() { take_medium(density_scale_to_come()); }
+  void take_medium(double density_scale);
   // Maximum mean scale factor of the volume's instance transforms.
   [[nodiscard]] double stretch() const;
-  // Density scale for coming grids, per unit length of the volume's own world space.
+  // Density scale of the medium, per unit length of the volume's own world space.
+  [[nodiscard]] double medium_density_scale() const { return medium_.density_scale * stretch(); }
+  // Density scale for coming grids: the one that the feed suggests, or that of the medium.
   [[nodiscard]] double density_scale_to_come() const;
   // True if the grid was refined for a density scale or anisotropy that no longer suits the medium, so that it must be
   // rebuilt.
@@ -290,21 +302,18 @@ class VolumeStage {
   VolumeInfoPtr volume_info_;
   VolumeAssetPtr empty_volume_;                          // used for surfaces without a volume
   std::optional<std::string> remarked_anisotropy_;       // the ignored grid that was logged
-  std::optional<Proxy> proxy_;                           // shown instead of the volume, and of its predecessor, while
-                                                         // it is loaded
   Built built_;                                          // newest; uploaded again after a change of context
   bool cuts_own_ = false;                                // the running build coarsens it to fit a limit
   std::vector<scene::InstanceTransform> transforms_{1};  // instance transforms of the volume; at least one
   std::vector<scene::InstanceTransform> previous_transforms_;
   bool transforms_changed_ = false;          // since the last traced frame
   scene::Part<scene::Medium> shown_medium_;  // of the viewer's own volume
-  // In the volume's own world space, for volume_. It becomes the medium's once a grid has been built for it.
-  std::optional<double> suggested_density_scale_;
-  std::vector<Shown> shown_;    // in the order in which they were added
-  bool requests_due_ = false;   // the requests for grids are outdated
-  bool waits_for_own_ = false;  // an instance waits for the volume's own grid, which is being built
+  std::vector<Shown> shown_;                 // in the order in which they were added
+  bool requests_due_ = false;                // the requests for grids are outdated
+  bool waits_for_own_ = false;               // an instance waits for the volume's own grid, which is being built
   ViewTrack track_;
-  VolumeFeedPtr feed_;                // shown instead of a volume; null: none
+  VolumeFeedPtr feed_;                // of the viewer's own volume; null: none
+  std::shared_ptr<FileFeed> file_;    // requested last; it becomes feed_ when it was read
   std::vector<VolumeFeedPtr> feeds_;  // of instances: sequences, then dynamic volumes
   FeedNumbers numbers_;
   std::size_t changed_instances_ = 0;
