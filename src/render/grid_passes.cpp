@@ -6,7 +6,6 @@
 
 #include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
-#include "render/pace.hpp"
 
 namespace cumulet::render {
 
@@ -29,8 +28,7 @@ void GridPasses::clear_in_flight() {
 double GridPasses::aim_ms() const {
   constexpr double least = 0.5;
   constexpr double most = 2.0;
-  const auto now = std::chrono::steady_clock::now();
-  return now < deadline_ ? std::clamp(part_of_rest * milliseconds(deadline_ - now), least, most) : least;
+  return std::clamp(pacer_.left_ms(0.0), least, most);
 }
 
 bool GridPasses::has_room_in_flight() {
@@ -78,7 +76,7 @@ void GridPasses::plan(Upload& upload, const Pass& pass, std::uint32_t first, std
       const std::optional<std::uint32_t> left = dispatch(pass, next, end, bind);
       if (!left) return false;
       next = *left;
-      if (std::chrono::steady_clock::now() >= deadline_) break;
+      if (pacer_.is_over()) break;
     }
     return next >= end;
   });

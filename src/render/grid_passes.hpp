@@ -9,6 +9,7 @@
 
 #include "gl/objects.hpp"
 #include "gl/programs.hpp"
+#include "render/dispatch_pacer.hpp"
 #include "render/grid_pace.hpp"
 #include "render/upload.hpp"
 
@@ -39,7 +40,7 @@ class GridPasses {
   GridPasses& operator=(const GridPasses&) = delete;
 
   /// Sets the deadline of the following steps.
-  void begin_call(Deadline deadline) { deadline_ = deadline; }
+  void begin_call(Deadline deadline) { pacer_ = DispatchPacer(deadline); }
   /// Plans a pass over items [first, end), in dispatches of bounded time. bind: binds buffers, and sets uniforms beyond
   /// the first three.
   void plan(Upload& upload, const Pass& pass, std::uint32_t first, std::uint32_t end, const Bind& bind);
@@ -57,7 +58,7 @@ class GridPasses {
   gl::ProgramsPtr programs_;
   GridPacePtr pace_;
   GLuint log2_size_;
-  Deadline deadline_{};  // of the current call
+  DispatchPacer pacer_{Deadline{}};  // of the current call
   gl::Fence fence_;
   std::vector<GridPace::Sent> in_flight_;       // since the previous ones were seen to be finished
   double in_flight_ms_ = 0.0;                   // estimated time of these

@@ -1,10 +1,10 @@
 #include "render/layer_cache.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "gl/state_guard.hpp"
+#include "render/dispatch_pacer.hpp"
 
 namespace cumulet::render {
 
@@ -70,9 +70,9 @@ void LayerCache::draw_measured(const TraceInputs& trace_inputs, glm::uvec2 size,
 
 bool LayerCache::ready(Deadline deadline) {
   if (!gl_->dispatches_in_call) return true;  // the device orders them
+  const DispatchPacer pacer(deadline);
   for (dispatches_.collect(); !dispatches_.draws().empty(); dispatches_.collect()) {
-    if (std::chrono::steady_clock::now() >= deadline) return false;
-    pass_time();
+    if (!pacer.wait(dispatches_.draws())) return false;
   }
   return true;
 }

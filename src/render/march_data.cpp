@@ -97,6 +97,11 @@ core::CmGrid parameters_of(const scene::MarchSource& source) {
   return grid;
 }
 
+// Texture units of voxels, by channel.
+constexpr std::array<GLuint, grid::channel_table.size()> channel_units{
+    core::CM_UNIT_CHANNELS, core::CM_UNIT_SCATTERING_VOXELS, core::CM_UNIT_ANISOTROPY_VOXELS,
+    core::CM_UNIT_VELOCITY_VOXELS};
+
 // In front of each tree: 25 pairs, and padding.
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
@@ -437,6 +442,10 @@ void MarchUpload::plan_dense() {
 }
 
 void MarchUpload::plan_channel_voxels() {
+  using grid::Channel;
+  const auto texture_of = [this](Channel channel) -> gl::Object& {
+    return data_.voxel_channels_[grid::index_of(channel)];
+  };
   const auto plan = [this](gl::Object& texture, const grid::RgbField& field, float unit, const char* what) {
     require_3d(limits_, source_->box_size, "creating the voxel colors");
     plan_voxels(texture, {&field.component(0), &field.component(1), &field.component(2), nullptr}, GL_RGBA16F, GL_RGBA,
@@ -444,14 +453,14 @@ void MarchUpload::plan_channel_voxels() {
   };
   if (const grid::RgbField* emission = source_->channels.emission.get()) {
     data_.parts_[0].grid.emission_unit = emission->max_value();
-    plan(data_.emission_voxels_, *emission, data_.parts_[0].grid.emission_unit, "creating the voxel emission");
+    plan(texture_of(Channel::emission), *emission, data_.parts_[0].grid.emission_unit, "creating the voxel emission");
   }
   // The unit is that of density 1, so that the color is this value divided by the density.
   if (const grid::RgbField* scattering = source_->channels.scattering.get())
-    plan(data_.scattering_voxels_, *scattering, source_->max_value, "creating the voxel scattering data");
+    plan(texture_of(Channel::color), *scattering, source_->max_value, "creating the voxel scattering data");
   if (const grid::ScalarField* forward = source_->channels.forward.get()) {
     require_3d(limits_, source_->box_size, "creating the voxel anisotropy");
-    plan_slabs(data_.anisotropy_voxels_, {GL_R16_SNORM, GL_RED, GL_SHORT, 1}, "creating the voxel anisotropy",
+    plan_slabs(texture_of(Channel::anisotropy), {GL_R16_SNORM, GL_RED, GL_SHORT, 1}, "creating the voxel anisotropy",
                [this, forward](std::span<std::uint16_t> slab, int first, int last) {
                  const std::vector<float> scattering = scattering_slab(*source_, slab.size(), first, last);
                  for_slab(*source_, forward->statistics(), first, last, [&](std::size_t at, float value) {
@@ -477,7 +486,7 @@ void MarchUpload::plan_channel_voxels() {
   const bool shows_motion = holds_motion(limits_, source_->box_size);
   if (!shows_motion) data_.parts_[0].grid.moves = 0;
   if (const grid::MomentumField* momentum = source_->channels.momentum.get(); momentum != nullptr && shows_motion) {
-    plan_slabs(data_.velocity_voxels_, {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating the voxel velocities",
+    plan_slabs(texture_of(Channel::velocity), {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating the voxel velocities",
                [this, momentum](std::span<std::uint16_t> slab, int first, int last) {
                  std::vector<glm::dvec3> sums(slab.size() / 4);
                  for (std::size_t i = 0; i < 3; ++i) {
@@ -585,11 +594,10 @@ void MarchData::bind(const gl::Functions& gl) const {
   for (std::size_t i = 0; i < textures_.size(); ++i) {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
-  if (scattering_voxels_) gl.BindTextureUnit(core::CM_UNIT_SCATTERING_VOXELS, scattering_voxels_.name());
-  if (anisotropy_voxels_) gl.BindTextureUnit(core::CM_UNIT_ANISOTROPY_VOXELS, anisotropy_voxels_.name());
-  if (velocity_voxels_) gl.BindTextureUnit(core::CM_UNIT_VELOCITY_VOXELS, velocity_voxels_.name());
+  for (std::size_t i = 0; i < voxel_channels_.size(); ++i) {
+    if (voxel_channels_[i]) gl.BindTextureUnit(channel_units[i], voxel_channels_[i].name());
+  }
   if (changes_) gl.BindTextureUnit(core::CM_UNIT_CHANGE_VOXELS, changes_.name());
-  if (emission_voxels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, emission_voxels_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
   if (trees_) gl.BindTextureUnit(core::CM_UNIT_TREE, trees_.texture());
 }

@@ -12,6 +12,7 @@
 
 #include "gl/objects.hpp"
 #include "gl/word_heap.hpp"
+#include "grid/channel_table.hpp"
 #include "render/built_grid.hpp"
 #include "render/parameters.hpp"
 #include "render/upload.hpp"
@@ -88,11 +89,8 @@ class MarchData {
   // per grid: the cells' emission, the table of emissive cells, and the cells' velocities, changes, colors and
   // anisotropies
   gl::WordHeap::Span channels_;
-  gl::Object emission_voxels_;
-  gl::Object scattering_voxels_;
-  gl::Object anisotropy_voxels_;
-  gl::Object velocity_voxels_;
-  gl::Object changes_;  // of voxels, or of bricks
+  std::array<gl::Object, grid::channel_table.size()> voxel_channels_;  // textures of voxels, by channel
+  gl::Object changes_;                                                 // of voxels, or of bricks
   gl::WordHeap::Span trees_;
   std::uint64_t bytes_ = 0;
 };

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "base/milliseconds.hpp"
@@ -264,49 +263,6 @@ double InFlightDispatches::expected_ms() const {
   double sum = 0.0;
   for (const InFlightDispatch& pending : in_flight_) sum += pending.what.max_ms;
   return likely_ * sum;
-}
-
-void pass_time() { std::this_thread::sleep_for(std::chrono::microseconds(50)); }
-
-void learn_rows(const InFlightDispatches::Completed& completed) {
-  const double ms = completed.ms.value_or(completed.at_most_ms);
-  if (completed.what.cost) completed.what.cost->learn(completed.what.slots, completed.ms ? ms : 0.0, ms);
-}
-
-void send_rows(InFlightDispatches& dispatches, const std::shared_ptr<RoundCost>& cost, glm::uvec2 size,
-               std::uint32_t& row, Clock::time_point deadline, const std::function<void(glm::uvec2 rows)>& send,
-               const std::function<void()>& collect) {
-  const double aim = std::clamp(0.7 * milliseconds_until(deadline), min_ms, dispatch_ms);
-  const auto slots = [&](std::uint32_t rows) { return double(rows) * size.x / lanes_per_slot; };
-  bool sent = false;
-  while (row < size.y) {
-    const double left = part_of_rest * milliseconds_until(deadline) - dispatches.expected_ms();
-    const bool anyway = !sent && dispatches.empty();
-    const double max_ms = std::clamp(left, anyway ? min_ms : 0.0, aim);
-    const auto fits = [&](std::uint32_t rows) {
-      const auto ms = cost->most(slots(rows));
-      return ms && *ms <= max_ms;
-    };
-    std::uint32_t height = 8;
-    while (height < size.y && fits(2 * height)) height *= 2;
-    if (!dispatches.full() && (anyway || fits(height) || !cost->most(1.0))) {
-      height = std::min(height, size.y - row);
-      Dispatched what;
-      what.slots = slots(height);
-      what.cost = cost;
-      what.max_ms = cost->most(what.slots).value_or(0.0);
-      dispatches.begin(InFlightDispatches::Kind::dispatch);
-      send({row, row + height});
-      dispatches.end(std::move(what), 0, 0);
-      row += height;
-      sent = true;
-    } else if (dispatches.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) {
-      break;
-    } else {
-      pass_time();
-    }
-    collect();
-  }
 }
 
 }  // namespace cumulet::render

@@ -1,12 +1,11 @@
 #include "render/path_sampler.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <numeric>
 #include <vector>
 
-#include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
+#include "render/dispatch_pacer.hpp"
 
 namespace cumulet::render {
 
@@ -23,8 +22,6 @@ static_assert(CM_MAX_SQUARES <= InFlightDispatches::max_words, "the squares must
 // llvmpipe silently ends a shader's loops after 65,535 iterations in total. This constant bounds the iterations of a
 // dispatch: a round takes some hundred.
 constexpr std::uint32_t max_rounds = 256;
-
-using Clock = std::chrono::steady_clock;
 
 // Returns a stride through n items that visits each once and jumps far from the last: near n times the golden ratio,
 // coprime to n.
@@ -96,16 +93,13 @@ bool PathSampler::accumulate(Picture& picture, const MarchData& data, const Trac
   const auto begun = [](const Block& block) { return !block.begins; };
   if (paths_of_.lock() != accumulation.blocks() && std::ranges::any_of(*accumulation.blocks(), begun))
     accumulation.begin_tile();
-  const double aim = std::clamp(0.7 * milliseconds_until(deadline), min_ms, dispatch_ms);
-  bool sent = false;
+  DispatchPacer pacer(deadline);
   while (!accumulation.done() && !(until_complete && accumulation.complete())) {
-    const double left = part_of_rest * milliseconds_until(deadline) - in_flight.expected_ms();
-    if (send(picture, trace_inputs, kernels, std::clamp(left, 0.0, aim), !sent)) {
-      sent = true;
-    } else {
-      // The dispatches in flight last until the deadline, or there is no time for more.
-      if (in_flight.empty() || Clock::now() >= deadline || (sent && left <= 0.0)) break;
-      pass_time();
+    const double aim = std::clamp(pacer.left_ms(in_flight.expected_ms()), 0.0, pacer.max_ms());
+    if (send(picture, trace_inputs, kernels, aim, pacer.must_send(in_flight))) {
+      pacer.note_sent();
+    } else if (!pacer.wait(in_flight)) {
+      break;
     }
     dispatches_.collect();
     accumulation.end_tile();
@@ -127,7 +121,7 @@ bool PathSampler::send(Picture& picture, const TraceInputs& trace_inputs, const 
   const std::shared_ptr<RoundCost>& cost = kernels.program.cost;
   const std::uint32_t rounds = kernels.stages ? PathKernels::max_rounds() : max_rounds;
   auto what = choose(blocks, accumulation.next_block(), cost, aim_ms, rounds);
-  if (!what && at_least && in_flight.empty()) what = choose_minimum(blocks, accumulation.next_block(), cost, rounds);
+  if (!what && at_least) what = choose_minimum(blocks, accumulation.next_block(), cost, rounds);
   if (!what) return false;
   dispatch(picture, trace_inputs, kernels, std::move(*what));
   return true;

@@ -41,7 +41,7 @@ class PathSampler {
   bool accumulate(Picture& picture, const MarchData& data, const TraceInputs& trace_inputs, Deadline deadline,
                   bool until_complete);
   // Sends one dispatch: samples, or a measurement of the error. Returns false if nothing can be sent. aim_ms: the
-  // time of the dispatch. at_least: sends a minimum even if it takes longer, unless dispatches are in flight.
+  // time of the dispatch. at_least: sends a minimum even if it takes longer.
   bool send(Picture& picture, const TraceInputs& trace_inputs, const Kernels& kernels, double aim_ms, bool at_least);
   void dispatch(Picture& picture, const TraceInputs& trace_inputs, const Kernels& kernels, Dispatched what);
   // Dispatches the kernel that measures the error of a tile whose samples are done.

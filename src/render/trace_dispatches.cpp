@@ -5,6 +5,7 @@
 
 #include "gl/bindings.hpp"
 #include "render/path_kernels.hpp"
+#include "render/row_dispatches.hpp"
 
 namespace cumulet::render {
 

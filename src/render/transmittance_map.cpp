@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
 #include "render/path_features.hpp"
+#include "render/row_dispatches.hpp"
 
 namespace cumulet::render {
 

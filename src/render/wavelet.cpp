@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <string>
 
-#include "base/milliseconds.hpp"
 #include "gl/bindings.hpp"
+#include "render/dispatch_pacer.hpp"
 #include "shader_macros.hpp"
 
 namespace cumulet::render {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // Each level doubles the stride of the filter: together 32 pixels to each side, if the picture is that large.
 constexpr std::uint32_t max_levels = 5;
@@ -322,16 +320,17 @@ bool Wavelet::work(const PictureTextures& picture, Deadline deadline) {
   const gl::DebugGroup group(*gl_, "cumulet: denoise");
   collect();
   dispatches_in_flight_.order();
+  DispatchPacer pacer(deadline, 1.0);
   double sent_ms = 0.0;
-  for (bool first = true; !done_; first = false) {
-    const double left = milliseconds_until(deadline) - dispatches_in_flight_.expected_ms() - sent_ms;
+  while (!done_) {
+    const double left = pacer.left_ms(dispatches_in_flight_.expected_ms() + sent_ms);
     const auto fits = [&](std::uint32_t rows) {
       const auto ms = cost(stage_, rows);
       return ms && *ms <= left;
     };
     // A stage of unknown cost is sent once at a time and measured.
     const bool known = cost(stage_, min_rows).has_value();
-    if (!first && (known ? !fits(min_rows) : left <= 0.0 || !dispatches_in_flight_.empty())) break;
+    if (pacer.has_sent() && (known ? !fits(min_rows) : left <= 0.0 || !dispatches_in_flight_.empty())) break;
     std::uint32_t rows = min_rows;
     while (row_ + rows < size_.y && fits(2 * rows)) rows *= 2;
     rows = std::min(rows, size_.y - row_);
@@ -341,6 +340,7 @@ bool Wavelet::work(const PictureTextures& picture, Deadline deadline) {
     program.use(*gl_);
     bind(picture, program);
     dispatch(program, rows, measured);
+    pacer.note_sent();
     collect();
   }
   gl::check(*gl_, "denoising the image");

@@ -2,26 +2,35 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "base/error.hpp"
 #include "scene/model_table.hpp"
 
 namespace cumulet::viewer {
 
-void ModelStage::add(std::shared_ptr<ModelInstance> model, std::uint64_t id) {
+void ModelStage::add_model(std::shared_ptr<ModelInstance> model, std::uint64_t id) {
+  failures_.retire();
+  host_.sync();
   if (find(*model) != shown_.end()) throw Error(ErrorCode::invalid_argument, "the model is already in the viewer");
   Shown shown;
   shown.id = id;
-  shown.listener = model->listen(notify_);
+  shown.listener = model->listen([host = &host_] { host->notify(); });
   shown.model = std::move(model);
   shown_.push_back(std::move(shown));
+  host_.sync();  // starts posing its surfaces
+  host_.touch();
 }
 
-void ModelStage::remove(const ModelInstance& model) {
+void ModelStage::remove_model(const ModelInstance& model) {
+  failures_.retire();
+  host_.sync();
   const auto found = find(model);
   if (found == shown_.end()) throw Error(ErrorCode::invalid_argument, "the model is not in the viewer");
   shown_.erase(found);
   poses_due_ = true;
+  host_.sync();  // drops its failures
+  host_.touch();
 }
 
 std::vector<ModelStage::Shown>::iterator ModelStage::find(const ModelInstance& model) {
@@ -91,7 +100,12 @@ void ModelStage::take_poses() {
   if (std::exchange(poses_due_, false)) poses_.request(std::move(requests));
 }
 
-void ModelStage::load(const FilePath& path) { surfaces_.load(path, choice_to_pose(settings_.choice, nullptr)); }
+void ModelStage::load_surfaces(const FilePath& path) {
+  failures_.retire();
+  host_.sync();
+  surfaces_.load(path, choice_to_pose(settings_.choice, nullptr));
+  host_.touch();
+}
 
 void ModelStage::cancel_surfaces(bool keep_poses) {
   surfaces_.forget_failure();
@@ -102,19 +116,47 @@ void ModelStage::cancel_surfaces(bool keep_poses) {
   }
 }
 
-void ModelStage::show(scene::ModelSourcePtr surfaces) {
+void ModelStage::show_surfaces(scene::ModelSourcePtr surfaces) {
+  failures_.retire();
+  cancel_surfaces(false);
+  host_.sync();
   asset_ = std::make_shared<const SurfaceAsset>(surfaces->scene, std::string());
   source_ = std::move(surfaces);
+  host_.touch();
 }
 
 void ModelStage::set_surfaces(SurfaceAssetPtr surfaces) {
+  failures_.retire();
+  cancel_surfaces(surfaces != nullptr);
+  host_.sync();
   asset_ = std::move(surfaces);
   pose_surfaces();
   if (!asset_) source_ = nullptr;
+  host_.touch();
 }
 
-bool ModelStage::configure_load(const SurfaceSettings& settings) {
-  return settings.choice != settings_.choice && !surfaces_.configure_load(choice_to_pose(settings.choice, nullptr));
+SurfaceAssetPtr ModelStage::surfaces_asset() {
+  host_.sync();
+  return asset_;
+}
+
+void ModelStage::set_surface_settings(const SurfaceSettings& settings) {
+  // A running load uses them without another pose.
+  const bool poses =
+      settings.choice != settings_.choice && !surfaces_.configure_load(choice_to_pose(settings.choice, nullptr));
+  if (poses) host_.sync();
+  settings_ = settings;
+  if (poses) pose_surfaces();
+  host_.touch();
+}
+
+const surface::SceneCamera& ModelStage::camera(std::size_t index) const {
+  const std::size_t count = source_ ? source_->pose.cameras.size() : 0;
+  if (index >= count) {
+    throw Error(ErrorCode::invalid_argument,
+                "there is no camera " + std::to_string(index) + ": the surfaces have " + std::to_string(count));
+  }
+  return source_->pose.cameras[index];
 }
 
 void ModelStage::pose_surfaces() {

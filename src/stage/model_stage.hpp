@@ -2,10 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "assets/instance.hpp"
@@ -15,46 +13,36 @@
 #include "jobs/surface_builder.hpp"
 #include "scene/snapshot.hpp"
 #include "stage/settings.hpp"
+#include "stage/stage_host.hpp"
+#include "surface/scene.hpp"
 
 namespace cumulet::viewer {
 
-/// The viewer's own surfaces, and models. Functions are called on the host's thread. The caller calls sync() before
-/// functions that replace surfaces.
+/// The viewer's own surfaces, and models. Functions are called on the host's thread. Functions that change settings
+/// have the contract of those of Viewer with the same name.
 class ModelStage {
  public:
-  /// surfaces, poses, failures: outlive the stage. notify: called on any thread when a model has changed.
-  ModelStage(SurfaceBuilder& surfaces, PoseCache& poses, ReportedFailures& failures, std::function<void()> notify)
-      : surfaces_(surfaces), poses_(poses), failures_(failures), notify_(std::move(notify)) {}
+  /// surfaces, poses, failures, host: outlive the stage.
+  ModelStage(SurfaceBuilder& surfaces, PoseCache& poses, ReportedFailures& failures, StageHost& host)
+      : surfaces_(surfaces), poses_(poses), failures_(failures), host_(host) {}
 
-  /// Shows a model. Throws Error(invalid_argument) if it is shown already.
-  void add(std::shared_ptr<ModelInstance> model, std::uint64_t id);
-  /// Throws Error(invalid_argument) if the model is not shown.
-  void remove(const ModelInstance& model);
   /// Reads changed settings, requests poses, and takes results. Returns how many models have changed.
   std::size_t sync();
   /// Poses of models are requested again by the next sync().
   void renew_requests() { poses_due_ = true; }
 
-  void load(const FilePath& path);
-  /// Cancels work because other surfaces will be shown. keep_poses: only loads, because a host may set surfaces faster
-  /// than they are posed.
-  void cancel_surfaces(bool keep_poses);
-  /// Shows these at once.
-  void show(scene::ModelSourcePtr surfaces);
-  /// Poses these, then shows them. Null: removes the surfaces at once.
+  void add_model(std::shared_ptr<ModelInstance> model, std::uint64_t id);
+  void remove_model(const ModelInstance& model);
+  void load_surfaces(const FilePath& path);
+  void show_surfaces(scene::ModelSourcePtr surfaces);
   void set_surfaces(SurfaceAssetPtr surfaces);
-  /// Passes other settings to a running load. Returns true if the newest surfaces must be posed instead.
-  [[nodiscard]] bool configure_load(const SurfaceSettings& settings);
-  void set_settings(const SurfaceSettings& settings) { settings_ = settings; }
+  void set_surface_settings(const SurfaceSettings& settings);
   [[nodiscard]] const SurfaceSettings& settings() const { return settings_; }
-  /// Requests the pose of the viewer's own surfaces.
-  void pose_surfaces();
   void set_shutter(double seconds);
 
-  /// The newest surfaces; null: none.
-  [[nodiscard]] const SurfaceAssetPtr& asset() const { return asset_; }
-  /// Their newest pose; null: none.
-  [[nodiscard]] const scene::ModelSourcePtr& source() const { return source_; }
+  SurfaceAssetPtr surfaces_asset();
+  /// Returns a camera of the newest pose of the surfaces. Throws Error(invalid_argument) if it does not exist.
+  [[nodiscard]] const surface::SceneCamera& camera(std::size_t index) const;
   /// Returns all displayed models, including the viewer's own surfaces.
   [[nodiscard]] std::vector<scene::Model> models() const;
   [[nodiscard]] bool shows_models() const;
@@ -80,6 +68,11 @@ class ModelStage {
     [[nodiscard]] bool is_shown() const { return is_wanted() && source; }
   };
   std::vector<Shown>::iterator find(const ModelInstance& model);
+  // Cancels work because other surfaces will be shown. keep_poses: only loads, because a host may set surfaces faster
+  // than they are posed.
+  void cancel_surfaces(bool keep_poses);
+  // Requests the pose of the viewer's own surfaces.
+  void pose_surfaces();
   // Takes the poses that are ready, and requests others.
   void take_poses();
   // Request for its pose one frame ago; nullopt: same as now.
@@ -90,12 +83,12 @@ class ModelStage {
   SurfaceBuilder& surfaces_;
   PoseCache& poses_;
   ReportedFailures& failures_;
-  std::function<void()> notify_;
+  StageHost& host_;
   SurfaceSettings settings_;
-  SurfaceAssetPtr asset_;
-  scene::ModelSourcePtr source_;
-  std::vector<Shown> shown_;  // in the order in which they were added
-  bool poses_due_ = false;    // the requests for poses are outdated
+  SurfaceAssetPtr asset_;         // the newest surfaces; null: none
+  scene::ModelSourcePtr source_;  // their newest pose; null: none
+  std::vector<Shown> shown_;      // in the order in which they were added
+  bool poses_due_ = false;        // the requests for poses are outdated
   double shutter_seconds_ = 0.0;
 };
 

@@ -22,20 +22,17 @@ void SequenceFeed::request(const std::optional<BuildSettings>& settings) {
   request_due_ = true;
 }
 
-std::optional<double> SequenceFeed::density_scale_to_use() const {
-  const bool is_used = suggestion_ == Suggestion::used_if_asked && sequence_->files()->shown.suggested_density_scale;
-  return is_used ? density_scale_ : std::nullopt;
-}
-
 bool SequenceFeed::take_info() {
   auto analyzed = cache_->take_analyzed();
   if (!analyzed) return false;
   volume_ = nullptr;
   volume_info_ = std::move(analyzed->volume_info);
   density_scale_ = analyzed->density_scale;
-  if (const std::optional<double> scale = density_scale_to_use()) {
+  const bool is_used = suggestion_ == Suggestion::used_if_asked && sequence_->files()->shown.suggested_density_scale;
+  suggest(is_used ? density_scale_ : std::nullopt);
+  if (suggested_density_scale()) {
     std::optional<BuildSettings> scaled = settings();
-    if (scaled) scaled->refine.density_scale = *scale;
+    if (scaled) scaled->refine.density_scale = *suggested_density_scale();
     request(scaled);
   }
   return true;

@@ -33,7 +33,6 @@ class SequenceFeed : public VolumeFeed {
   }
   [[nodiscard]] VolumeInfoPtr info() const override { return volume_info_; }
   [[nodiscard]] VolumeAssetPtr volume() const override { return volume_; }
-  [[nodiscard]] std::optional<double> density_scale_to_use() const override;
   [[nodiscard]] const void* source() const override { return sequence_.get(); }
   [[nodiscard]] std::shared_ptr<JobSource> jobs() const override { return cache_; }
 
@@ -61,7 +60,7 @@ class SequenceFeed : public VolumeFeed {
   std::uint64_t revision_ = 0;  // of the last request
   SequenceState state_;
   VolumeInfoPtr volume_info_;
-  std::optional<double> density_scale_;  // suggested for it, after its analysis
+  std::optional<double> density_scale_;  // for its status: result of its analysis
   VolumeAssetPtr volume_;
   bool request_due_ = true;
   std::uint64_t cache_revision_ = 0;  // revision of the cache when it was last checked

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/one_line.hpp"
+#include "scene/origin.hpp"
 
 namespace cumulet::viewer {
 
@@ -27,9 +28,42 @@ dvec3 to_sun(double azimuth_degrees, double elevation_degrees) {
 void SkyStage::set_light(const Light& light) {
   light_ = light;
   update();
+  host_.touch();
+}
+
+void SkyStage::set_lights(light::AnalyticLights lights) {
+  analytic_lights_ = std::move(lights);
+  lights_origin_.reset();
+  host_.touch();
+}
+
+const scene::Part<light::AnalyticLights>& SkyStage::analytic_lights(const dvec3& origin) {
+  if (lights_origin_ != origin) relative_lights_.set(scene::counted_from(analytic_lights_, origin));
+  lights_origin_ = origin;
+  return relative_lights_;
+}
+
+void SkyStage::load_environment(const FilePath& path) {
+  failures_.retire();
+  host_.sync();
+  builder_.load(path);
+  host_.touch();
 }
 
 void SkyStage::set_environment(light::EnvironmentPtr environment) {
+  failures_.retire();
+  builder_.drop_loads();
+  host_.sync();
+  show(std::move(environment));
+  host_.touch();
+}
+
+const light::EnvironmentPtr& SkyStage::environment() {
+  host_.sync();
+  return environment_;
+}
+
+void SkyStage::show(light::EnvironmentPtr environment) {
   if (environment && !environment->remarks.empty()) {
     std::string remarks;
     for (const std::string& remark : environment->remarks) remarks.append(remarks.empty() ? ": " : "; ").append(remark);
@@ -46,15 +80,17 @@ void SkyStage::set_environment(light::EnvironmentPtr environment) {
 void SkyStage::set_environment_settings(const EnvironmentSettings& settings) {
   environment_settings_ = settings;
   update();
+  host_.touch();
 }
 
 void SkyStage::set_ground(const GroundSettings& settings) {
   ground_ = settings;
   update();
+  host_.touch();
 }
 
 void SkyStage::sync() {
-  if (auto read = builder_.take_environment()) set_environment(std::move(*read));
+  if (auto read = builder_.take_environment()) show(std::move(*read));
   if (auto sky = builder_.take_sky()) {
     if (asked_day_ == sky->day) asked_day_.reset();
     // A sky requested earlier is displayed until the newest is ready.

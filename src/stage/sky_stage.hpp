@@ -4,26 +4,33 @@
 #include <optional>
 #include <utility>
 
+#include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "jobs/environment_builder.hpp"
+#include "jobs/reported_failures.hpp"
+#include "light/analytic_lights.hpp"
 #include "light/environment.hpp"
 #include "light/sky.hpp"
 #include "scene/snapshot.hpp"
 #include "stage/settings.hpp"
+#include "stage/stage_host.hpp"
 
 namespace cumulet::viewer {
 
-/// Sun, sky, environment and the settings of the ground. Functions are called on the host's thread.
+/// Sun, sky, environment, the host's lights and the settings of the ground. Functions are called on the host's thread.
+/// Functions that change settings have the contract of those of Viewer with the same name.
 class SkyStage {
  public:
-  /// builder: outlives the stage.
-  SkyStage(EnvironmentBuilder& builder, Log log) : builder_(builder), log_(std::move(log)) {}
+  /// builder, failures, host: outlive the stage.
+  SkyStage(EnvironmentBuilder& builder, ReportedFailures& failures, StageHost& host, Log log)
+      : builder_(builder), failures_(failures), host_(host), log_(std::move(log)) {}
 
   void set_light(const Light& light);
   [[nodiscard]] const Light& light() const { return light_; }
-  /// Shows this environment. Null: the sky of the light settings.
+  void set_lights(light::AnalyticLights lights);
+  void load_environment(const FilePath& path);
   void set_environment(light::EnvironmentPtr environment);
-  [[nodiscard]] const light::EnvironmentPtr& environment() const { return environment_; }
+  const light::EnvironmentPtr& environment();
   void set_environment_settings(const EnvironmentSettings& settings);
   void set_ground(const GroundSettings& settings);
   [[nodiscard]] bool has_ground() const { return ground_.mode != GroundMode::none; }
@@ -35,14 +42,20 @@ class SkyStage {
                                                     const std::optional<glm::dvec3>& eye) const;
   [[nodiscard]] const scene::Part<light::DistantLights>& lights() const { return lights_; }
   [[nodiscard]] const scene::Part<light::Surroundings>& surroundings() const { return surroundings_; }
+  /// The host's lights, relative to this origin.
+  [[nodiscard]] const scene::Part<light::AnalyticLights>& analytic_lights(const glm::dvec3& origin);
 
  private:
+  // Shows this environment. Null: the sky of the light settings.
+  void show(light::EnvironmentPtr environment);
   // Updates lights and surroundings from the settings.
   void update();
   // Returns the inputs of the physical sky; nullopt without one.
   [[nodiscard]] std::optional<light::Day> day() const;
 
   EnvironmentBuilder& builder_;
+  ReportedFailures& failures_;
+  StageHost& host_;
   Log log_;
   Light light_;
   std::optional<light::Day> asked_day_;      // sky being computed
@@ -52,6 +65,9 @@ class SkyStage {
   GroundSettings ground_;
   scene::Part<light::DistantLights> lights_;
   scene::Part<light::Surroundings> surroundings_;
+  light::AnalyticLights analytic_lights_;  // set by the host, in world space
+  scene::Part<light::AnalyticLights> relative_lights_;
+  std::optional<glm::dvec3> lights_origin_ = glm::dvec3(0.0);  // of relative_lights_; nullopt: they are outdated
 };
 
 }  // namespace cumulet::viewer

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -20,8 +21,8 @@ struct FeedContext {
   std::function<void()> notify;  ///< called on any thread when the source has changed
 };
 
-/// Requests grids of a source of volumes that changes, and takes them one after another. The viewer's own volume and
-/// instances use the same classes. Functions are called on the host's thread.
+/// Requests grids of a source of volumes, and takes them one after another. The viewer's own volume and instances use
+/// the same classes. Functions are called on the host's thread.
 class VolumeFeed {
  public:
   explicit VolumeFeed(const FeedContext& context) : id_(context.id), last_taken_(context.last_taken) {}
@@ -37,6 +38,7 @@ class VolumeFeed {
   enum class Taken {
     nothing,  ///< nothing is ready
     same,     ///< the same grid as before, whose voxels may have been dropped
+    former,   ///< a grid of a former volume, which was requested before this one
     other     ///< another grid
   };
   /// Sends outdated requests. Takes the newest result, unless the previous one must be displayed first, so that each
@@ -50,11 +52,14 @@ class VolumeFeed {
   [[nodiscard]] virtual VolumeInfoPtr info() const = 0;
   /// Voxels of the result taken last; null: none, or they are not in memory.
   [[nodiscard]] virtual VolumeAssetPtr volume() const = 0;
-  /// Density scale suggested for all frames, if the medium is to use it.
-  [[nodiscard]] virtual std::optional<double> density_scale_to_use() const { return std::nullopt; }
   /// Identifies the source.
   [[nodiscard]] virtual const void* source() const = 0;
   [[nodiscard]] virtual std::shared_ptr<JobSource> jobs() const = 0;
+
+  /// Density scale suggested for the volume or for all frames, in the volume's own world space, which the medium is to
+  /// use once a grid has been built for it. Nullopt: none, or take_suggestion() was called.
+  [[nodiscard]] const std::optional<double>& suggested_density_scale() const { return suggested_density_scale_; }
+  std::optional<double> take_suggestion() { return std::exchange(suggested_density_scale_, std::nullopt); }
 
   [[nodiscard]] std::uint64_t id() const { return id_; }
   [[nodiscard]] const std::optional<BuildSettings>& settings() const { return settings_; }
@@ -62,23 +67,32 @@ class VolumeFeed {
   [[nodiscard]] const std::optional<Built>& built() const { return built_; }
   /// Frame or state of that grid; nullopt: none.
   [[nodiscard]] const std::optional<scene::SequenceFrame>& frame() const { return frame_; }
+  /// Returns the frame or state of this feed among those that are displayed; nullopt: none.
+  [[nodiscard]] std::optional<scene::SequenceFrame> find_in(const scene::SequenceFrames& displayed) const {
+    const auto found = std::ranges::find(displayed, id_, &scene::SequenceFrame::sequence);
+    return found == displayed.end() ? std::nullopt : std::optional(*found);
+  }
   /// True if a frame has rendered it.
   [[nodiscard]] bool is_rendered() const { return is_rendered_; }
   void note_rendered() { is_rendered_ = true; }
 
  protected:
   void set_settings(const std::optional<BuildSettings>& settings) { settings_ = settings; }
+  void suggest(const std::optional<double>& density_scale) { suggested_density_scale_ = density_scale; }
   // Records a result that was taken.
   void set_taken(std::uint64_t number, double part, Built built) {
     frame_ = scene::SequenceFrame{number, id_, ++last_taken_, part};
     is_rendered_ = false;
-    built_ = std::move(built);
+    set_built(std::move(built));
   }
+  // Records a result that is no frame or state.
+  void set_built(Built built) { built_ = std::move(built); }
 
  private:
   std::uint64_t id_;
   std::uint64_t& last_taken_;
   std::optional<BuildSettings> settings_;
+  std::optional<double> suggested_density_scale_;
   std::optional<Built> built_;
   std::optional<scene::SequenceFrame> frame_;
   bool is_rendered_ = false;

@@ -222,7 +222,7 @@ void VolumeStage::request_for_grids() {
                                        [&](const GridCache::Request& request) {
                                          return request.volume == volume_ && suits(grid_.build, request.settings);
                                        })) ||
-      feed_;
+      plays();
   const std::size_t grids = requests.size() + feeds_.size() + (own_is_apart ? 1 : 0);
   budget_.set_grids(grids);
   for (GridCache::Request& request : requests) request.gl_bytes = budget_.part();

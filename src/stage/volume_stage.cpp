@@ -40,59 +40,43 @@ std::shared_ptr<Source> borrowed(Source& source) {
 }  // namespace
 
 void VolumeStage::sync() {
-  if (auto loaded = jobs_.builder.take_loaded()) {
-    take_volume(std::move(loaded->volume));
-    suggested_density_scale_ = loaded->density_scale;
-    if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
-    if (feed_) {
-      leave_feed();
-      take_medium();
-    }
-  }
-  if (auto built = jobs_.builder.take_built()) {
-    // A rebuild keeps the timings of the load.
-    if (built->volume == built_.volume) {
-      if (built->seconds.load == 0.0) built->seconds.load = built_.seconds.load;
-      if (built->seconds.statistics == 0.0) built->seconds.statistics = built_.seconds.statistics;
-    }
-    built_ = std::move(*built);
-    cuts_own_ = false;
-    requests_due_ = true;
-    if (built_.volume == volume_) {  // else it is the previous volume, for which a grid was requested
-      drop_proxy();
-      take_suggestion();
-    }
-  }
+  if (file_ && file_->take_volume()) show_file();
+  follow_feed();
   fit_cells();
   follow_proxy();
-  follow_feed();
   take_states(false);
   follow_instances();
+}
+
+void VolumeStage::show_file() {
+  take_volume(file_->volume());
+  const bool played = plays();
+  if (played) leave_feed();
+  feed_ = file_;
+  if (const auto& scale = feed_->suggested_density_scale()) grid_.build.refine.density_scale = *scale;
+  if (played) take_medium();
 }
 
 void VolumeStage::follow_proxy() {
   // A sequence or a dynamic volume is shown until the new volume is ready. Without previews no proxy is used, because
   // read-back must only contain the requested volume.
-  if (auto made = jobs_.builder.take_proxy(); made && preview_ && !feed_) {
-    proxy_ = std::move(made);
-    show_medium();
-  }
-  // Check in this order: a job stores its result before it ends.
-  if (!proxy_ || !proxy_->load.expired() || jobs_.builder.has_result()) return;
+  if (file_ && file_->take_proxy(preview_ && !plays())) show_medium();
+  if (!shows_proxy() || file_->loads_after_proxy()) return;
   // Either the volume was loaded and the next frame requests its grid, or the load failed.
   const bool waits = grid_.camera_adaptive && volume_ && built_.volume != volume_ && !jobs_.builder.status().failure;
   if (!waits) drop_proxy();
 }
 
 void VolumeStage::drop_proxy() {
-  if (!proxy_) return;
-  proxy_.reset();
+  if (!shows_proxy()) return;
+  file_->drop_proxy();
   show_medium();
 }
 
 void VolumeStage::take_suggestion() {
-  if (!suggested_density_scale_) return;
-  medium_.density_scale = *std::exchange(suggested_density_scale_, std::nullopt) / stretch();
+  const std::optional<double> scale = feed_->take_suggestion();
+  if (!scale) return;
+  medium_.density_scale = *scale / stretch();
   show_medium();
 }
 
@@ -111,13 +95,13 @@ bool VolumeStage::begin_anew(bool shows, bool showed) {
   drop_proxy();
   host_.sync();
   leave_feed();
+  file_.reset();
   if (!shows) {
     take_volume(nullptr);
     built_ = {};
     host_.touch();
     return false;
   }
-  suggested_density_scale_.reset();
   take_medium();
   track_.built_for.reset();
   return true;
@@ -161,8 +145,7 @@ void VolumeStage::follow_feed() {
     volume_info_ = feed_->info();
     requests_due_ = true;
     remark_on_anisotropy();
-    suggested_density_scale_ = feed_->density_scale_to_use();
-    if (suggested_density_scale_) grid_.build.refine.density_scale = *suggested_density_scale_;
+    if (const auto& scale = feed_->suggested_density_scale()) grid_.build.refine.density_scale = *scale;
   }
   take_from_feed(is_seen(*feed_));
 }
@@ -171,14 +154,25 @@ void VolumeStage::take_from_feed(bool is_seen) {
   const VolumeFeed::Taken taken = feed_->take(is_seen);
   if (taken == VolumeFeed::Taken::nothing) return;
   volume_ = feed_->volume();
-  const std::optional<Built>& built = feed_->built();
-  if (taken == VolumeFeed::Taken::same || !built) return;
-  built_ = *built;
+  if (taken == VolumeFeed::Taken::same || !feed_->built()) return;
+  Built built = *feed_->built();
+  const bool is_asset = as_asset(feed_) != nullptr;
+  if (is_asset) {
+    // A rebuild keeps the timings of the load.
+    if (built.volume == built_.volume) {
+      if (built.seconds.load == 0.0) built.seconds.load = built_.seconds.load;
+      if (built.seconds.statistics == 0.0) built.seconds.statistics = built_.seconds.statistics;
+    }
+    cuts_own_ = false;
+  }
+  built_ = std::move(built);
   if (VolumeInfoPtr info = feed_->info(); info != volume_info_) {
     volume_info_ = std::move(info);
     remark_on_anisotropy();
   }
-  if (!shown_.empty()) requests_due_ = true;
+  if (is_asset || !shown_.empty()) requests_due_ = true;
+  if (taken == VolumeFeed::Taken::former) return;
+  drop_proxy();
   take_suggestion();
 }
 
@@ -234,34 +228,28 @@ bool VolumeStage::built_for_another() const {
 void VolumeStage::request_build(bool (*concerned)(const VolumeAsset&)) {
   reported_failures_.retire();
   const bool loads = jobs_.builder.configure_load(settings_at_once());
-  if (loads && !feed_) return;
+  if (loads && !plays()) return;
   host_.sync();
-  const auto settings = settings_at_once();
-  if (feed_) {
-    if (!loads) jobs_.builder.forget_failure();  // of a load that would have replaced the sequence
+  if (plays()) {
     // The `concerned` test is skipped, because other frames may have fields that the displayed one lacks.
-    track_.built_for.reset();
-    feed_->request(settings);
+    if (!loads) jobs_.builder.forget_failure();  // of a load that would have replaced the sequence
+  } else if (loads || (concerned != nullptr && volume_ && !concerned(*volume_))) {
     return;
   }
-  if (loads) return;
-  if (concerned != nullptr && volume_ && !concerned(*volume_)) return;
   track_.built_for.reset();
-  if (volume_ && settings) jobs_.builder.build(volume_, *settings);
+  if (feed_) feed_->request(settings_at_once());
 }
 
 void VolumeStage::load_volume(const VolumeFile& file) {
   reported_failures_.retire();
   host_.sync();
-  const auto suggested = std::exchange(suggested_density_scale_, std::nullopt);
-  take_medium();
+  if (feed_ && !plays()) feed_->take_suggestion();  // the medium stays
+  take_medium(medium_density_scale());
   drop_proxy();
-  jobs_.builder.load(file, settings_at_once(), preview_ ? std::optional(grid_.build) : std::nullopt);
+  file_ = std::make_shared<FileFeed>(file, settings_at_once(), preview_ ? std::optional(grid_.build) : std::nullopt,
+                                     borrowed(jobs_.builder), feed_context());
   // A sequence or a dynamic volume is shown until the new volume is ready.
-  if (feed_) {
-    suggested_density_scale_ = suggested;
-    take_medium();
-  }
+  if (plays()) take_medium();
   host_.touch();
 }
 
@@ -277,13 +265,14 @@ void VolumeStage::set_volume(VolumeAssetPtr volume) {
   drop_proxy();
   host_.sync();
   leave_feed();
+  file_.reset();
+  if (volume) feed_ = std::make_shared<AssetFeed>(volume, borrowed(jobs_.builder), feed_context());
   take_volume(std::move(volume));
-  suggested_density_scale_.reset();
-  if (!volume_) {
+  if (!feed_) {
     built_ = {};
   } else if (!grid_.camera_adaptive) {
     take_medium();
-    jobs_.builder.build(volume_, grid_.build);
+    feed_->request(grid_.build);
   }
   host_.touch();
 }
@@ -334,7 +323,7 @@ void VolumeStage::fit_cells() {
   // The running job may have been started under other limits, or for another volume.
   if (!budget_.cells_are_due() || jobs_.builder.busy()) return;
   budget_.note_cells();
-  if (!volume_ || !is_of_cells(built_) || feed_) return;
+  if (!volume_ || !is_of_cells(built_) || plays()) return;
   cuts_own_ = !has_cells_allowed(built_, budget_.limits());
   if (cuts_own_) request_build();
 }
@@ -356,10 +345,10 @@ void VolumeStage::set_grid(const GridSettings& settings) {
   host_.touch();
 }
 
-void VolumeStage::take_medium() {
+void VolumeStage::take_medium(double density_scale) {
   grid_.build.emission = field_emission();
   grid_.build.density_ramp = ramps_.density;
-  grid_.build.refine.density_scale = density_scale_to_come();
+  grid_.build.refine.density_scale = density_scale;
   grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
   grid_.build.anisotropic = medium_.phase.may_vary();
   grid_.build.shutter_seconds = shutter_seconds_;
@@ -408,7 +397,7 @@ void VolumeStage::set_medium(const Medium& medium) {
 }
 
 double VolumeStage::density_scale_to_come() const {
-  return suggested_density_scale_ ? *suggested_density_scale_ : medium_.density_scale * stretch();
+  return feed_ ? feed_->suggested_density_scale().value_or(medium_density_scale()) : medium_density_scale();
 }
 
 bool VolumeStage::other_opacity() const {
@@ -420,7 +409,8 @@ bool VolumeStage::other_opacity() const {
 
 Medium VolumeStage::seen_medium() const {
   Medium medium = medium_;
-  if (proxy_ && proxy_->density_scale) medium.density_scale = *proxy_->density_scale / stretch();
+  if (const Proxy* shown = proxy(); shown != nullptr && shown->density_scale)
+    medium.density_scale = *shown->density_scale / stretch();
   return medium;
 }
 
@@ -610,19 +600,20 @@ void VolumeStage::request_for_view(bool view_rests, const std::function<bool()>&
   const bool transforms_rest = !std::exchange(transforms_changed_, false);
   // A build of the previous volume would replace the queued load.
   const bool another_comes = jobs_.builder.loads();
-  const bool waits = another_comes && volume_ && !feed_ && std::ranges::none_of(shown_, &Shown::is_there);
+  AssetFeed* own = as_asset(feed_);
+  const bool waits = another_comes && own != nullptr && std::ranges::none_of(shown_, &Shown::is_there);
   if (!is_shown() || !built_for_another() || waits) return;
   const bool rests = !preview_ || !track_.built_for || (view_rests && transforms_rest);
   // GPU builds follow a moving camera, one grid after another, each of which is displayed.
-  const bool follows = volume_ && !feed_ && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
+  const bool follows = own != nullptr && built_.source && built_.source->plan && grid_.build.on == BuildOn::gpu &&
                        !jobs_.builder.busy() && displays_newest();
   if (!rests && !follows) return;
   take_medium();
-  if (feed_) {
+  if (own != nullptr) {
+    if (!another_comes) own->build(settings_for_view(), rests ? nullptr : built_.source->plan);
+  } else if (feed_) {
     feed_->request(settings_for_view());
     if (as_dynamic(feed_) == nullptr) follow_feed();
-  } else if (volume_ && !another_comes) {
-    jobs_.builder.build(volume_, settings_for_view(), rests ? nullptr : built_.source->plan);
   }
   requests_due_ = true;
   follow_instances();
@@ -648,7 +639,7 @@ VolumeAssetPtr VolumeStage::empty_volume(const std::optional<Bounds>& box) {
 std::vector<scene::Volume> VolumeStage::volumes(const std::vector<scene::Volume>& before) const {
   std::vector<scene::Volume> volumes;
   // The empty volume for surfaces is left out if instances are displayed.
-  const scene::MarchSourcePtr& source = proxy_ ? proxy_->source : built_.source;
+  const scene::MarchSourcePtr& source = shows_proxy() ? proxy()->source : built_.source;
   if (source && (shown_info() || !shows_instances())) {
     const auto frame = feed_ ? feed_->frame() : std::nullopt;
     for (const scene::InstanceTransform& transform : transforms_)
@@ -697,7 +688,7 @@ void VolumeStage::keep_to_one_march(std::vector<scene::Volume>& volumes,
 void VolumeStage::keep_until_cells_are_cut(std::vector<scene::Volume>& volumes,
                                            const std::vector<scene::Volume>& before) const {
   if (!budget_.is_limited()) return;
-  const bool own = cuts_own_ && jobs_.builder.busy() && !jobs_.builder.loads() && !proxy_ && !feed_;
+  const bool own = cuts_own_ && jobs_.builder.busy() && !jobs_.builder.loads() && !shows_proxy() && !plays();
   if (!own && std::ranges::none_of(shown_, [this](const Shown& shown) { return makes_room(shown); })) return;
   const auto was = [&](const scene::Volume& volume) {
     return std::ranges::find(before, volume.id, &scene::Volume::id);
@@ -721,6 +712,16 @@ void VolumeStage::count_from(std::vector<scene::Volume>& volumes, const dvec3& o
 void VolumeStage::note_rendered() {
   if (feed_) feed_->note_rendered();
   for (const VolumeFeedPtr& feed : feeds_) feed->note_rendered();
+}
+
+void VolumeStage::note_displayed(const scene::SequenceFrames& shown) {
+  const auto note = [&](const VolumeFeedPtr& feed) {
+    DynamicFeed* live = as_dynamic(feed);
+    if (live == nullptr) return;
+    if (const auto frame = live->find_in(shown)) live->note_displayed(*frame);
+  };
+  note(feed_);
+  std::ranges::for_each(feeds_, note);
 }
 
 void VolumeStage::take_gl_bytes(std::uint64_t beside_volumes) {

@@ -16,7 +16,9 @@
 #include "base/log.hpp"
 #include "jobs/jobs.hpp"
 #include "scene/snapshot.hpp"
+#include "stage/asset_feed.hpp"
 #include "stage/dynamic_feed.hpp"
+#include "stage/file_feed.hpp"
 #include "stage/gl_budget.hpp"
 #include "stage/sequence_feed.hpp"
 #include "stage/settings.hpp"
@@ -62,6 +64,7 @@ class VolumeStage {
   void set_transforms(const std::vector<scene::InstanceTransform>& transforms);
   void set_previous_transforms(std::vector<scene::InstanceTransform> transforms) {
     previous_transforms_ = std::move(transforms);
+    host_.touch();
   }
   void add_instance(std::shared_ptr<Instance> instance, std::uint64_t id);
   void remove_instance(const Instance& instance);
@@ -80,8 +83,8 @@ class VolumeStage {
   /// Metadata of the volume or the sequence.
   [[nodiscard]] const VolumeInfoPtr& volume_info() const { return volume_info_; }
   /// Metadata of the displayed volume: that of the proxy while there is one.
-  [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy_ ? proxy_->volume_info : volume_info_; }
-  [[nodiscard]] bool shows_proxy() const { return proxy_.has_value(); }
+  [[nodiscard]] const VolumeInfoPtr& shown_info() const { return proxy() ? proxy()->volume_info : volume_info_; }
+  [[nodiscard]] bool shows_proxy() const { return proxy() != nullptr; }
   [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return transforms_; }
   [[nodiscard]] const Ramps& ramps() const { return ramps_; }
   [[nodiscard]] const Medium& medium() const { return medium_; }
@@ -92,10 +95,6 @@ class VolumeStage {
   /// Also throw Error(invalid_argument) for an instance that is not shown.
   [[nodiscard]] const SequenceFeed& sequence_of(const Instance& instance);
   [[nodiscard]] const DynamicFeed& live_of(const Instance& instance);
-  /// The feed shown instead of a volume; null: none.
-  [[nodiscard]] const VolumeFeedPtr& feed() const { return feed_; }
-  /// Feeds of instances: sequences, then dynamic volumes.
-  [[nodiscard]] const std::vector<VolumeFeedPtr>& feeds() const { return feeds_; }
   /// Returns the host's tag of an instance; nullopt if it is not shown.
   [[nodiscard]] std::optional<std::uint64_t> tag_of(std::uint64_t id) const;
   [[nodiscard]] GridTotals totals() const;
@@ -134,6 +133,8 @@ class VolumeStage {
 
   /// Marks all frames and states taken last as rendered.
   void note_rendered();
+  /// Records the frames and states that are displayed.
+  void note_displayed(const scene::SequenceFrames& shown);
   /// Takes the GPU memory used by everything except volumes in this frame.
   void take_gl_bytes(std::uint64_t beside_volumes);
   /// Takes newest states although the previous ones have not been displayed.
@@ -201,6 +202,13 @@ class VolumeStage {
     std::uint64_t last_taken = 0;
   };
 
+  // True if a sequence or a dynamic volume is shown instead of a volume.
+  [[nodiscard]] bool plays() const { return feed_ && as_asset(feed_) == nullptr; }
+  // The proxy of a volume that is being loaded, which is shown instead of the volume and of its predecessor; null:
+  // none.
+  [[nodiscard]] const Proxy* proxy() const { return file_ && file_->proxy() ? &*file_->proxy() : nullptr; }
+  // Shows the volume of file_, which has been read.
+  void show_file();
   // Updates the request of the viewer's own feed and takes its results.
   void follow_feed();
   void take_from_feed(bool is_seen);
@@ -214,7 +222,7 @@ class VolumeStage {
   // Requests a rebuild if the limits allow more cells or fewer cells than the grid has.
   void fit_cells();
   void drop_proxy();
-  // Stops showing a sequence or a dynamic volume.
+  // Stops following the viewer's own feed.
   void leave_feed();
   // Returns true if the state or frame taken last has been displayed, or if images are not being displayed at all.
   [[nodiscard]] bool is_seen(const VolumeFeed& feed) const;
@@ -222,15 +230,18 @@ class VolumeStage {
   bool begin_anew(bool shows, bool showed);
   // Makes this the current volume; null: none.
   void take_volume(VolumeAssetPtr volume);
-  // Sets the medium's density scale to the suggested one. Called with the first grid built for it.
+  // Sets the medium's density scale to the one that the feed suggests. Called with the first grid built for it.
   void take_suggestion();
   // Requests new grids. concerned: if set, a volume for which it returns false keeps its grid.
   void request_build(bool (*concerned)(const VolumeAsset&) = nullptr);
-  // Copies the medium and the ramps to the build settings.
-  void take_medium();
+  // Copies the medium and the ramps to the build settings, with the density scale of coming grids or with this one.
+  void take_medium() { take_medium(density_scale_to_come()); }
+  void take_medium(double density_scale);
   // Maximum mean scale factor of the volume's instance transforms.
   [[nodiscard]] double stretch() const;
-  // Density scale for coming grids, per unit length of the volume's own world space.
+  // Density scale of the medium, per unit length of the volume's own world space.
+  [[nodiscard]] double medium_density_scale() const { return medium_.density_scale * stretch(); }
+  // Density scale for coming grids: the one that the feed suggests, or that of the medium.
   [[nodiscard]] double density_scale_to_come() const;
   // True if the grid was refined for a density scale or anisotropy that no longer suits the medium, so that it must be
   // rebuilt.
@@ -291,22 +302,19 @@ class VolumeStage {
   VolumeInfoPtr volume_info_;
   VolumeAssetPtr empty_volume_;                          // used for surfaces without a volume
   std::optional<std::string> remarked_anisotropy_;       // the ignored grid that was logged
-  std::optional<Proxy> proxy_;                           // shown instead of the volume, and of its predecessor, while
-                                                         // it is loaded
   Built built_;                                          // newest; uploaded again after a change of context
   bool cuts_own_ = false;                                // the running build coarsens it to fit a limit
   std::vector<scene::InstanceTransform> transforms_{1};  // instance transforms of the volume; at least one
   std::vector<scene::InstanceTransform> previous_transforms_;
   bool transforms_changed_ = false;          // since the last traced frame
   scene::Part<scene::Medium> shown_medium_;  // of the viewer's own volume
-  // In the volume's own world space, for volume_. It becomes the medium's once a grid has been built for it.
-  std::optional<double> suggested_density_scale_;
-  std::vector<Shown> shown_;    // in the order in which they were added
-  bool requests_due_ = false;   // the requests for grids are outdated
-  bool waits_for_own_ = false;  // an instance waits for the volume's own grid, which is being built
+  std::vector<Shown> shown_;                 // in the order in which they were added
+  bool requests_due_ = false;                // the requests for grids are outdated
+  bool waits_for_own_ = false;               // an instance waits for the volume's own grid, which is being built
   ViewTrack track_;
-  VolumeFeedPtr feed_;
-  std::vector<VolumeFeedPtr> feeds_;
+  VolumeFeedPtr feed_;                // of the viewer's own volume; null: none
+  std::shared_ptr<FileFeed> file_;    // requested last; it becomes feed_ when it was read
+  std::vector<VolumeFeedPtr> feeds_;  // of instances: sequences, then dynamic volumes
   FeedNumbers numbers_;
   std::size_t changed_instances_ = 0;
 };

@@ -1,34 +1,26 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <glm/glm.hpp>
 #include <memory>
 #include <optional>
 #include <span>
-#include <string>
+#include <utility>
 #include <vector>
 
-#include "assets/camera.hpp"
-#include "assets/instance.hpp"
-#include "assets/sequence.hpp"
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/trace.hpp"
-#include "denoise/network.hpp"
+#include "denoise/network_cache.hpp"
 #include "jobs/jobs.hpp"
-#include "scene/snapshot.hpp"
-#include "stage/model_stage.hpp"
-#include "stage/sky_stage.hpp"
-#include "stage/volume_stage.hpp"
+#include "stage/stage.hpp"
+#include "viewer/attached_context.hpp"
 #include "viewer/context.hpp"
 #include "viewer/dynamic_gl_bridge.hpp"
-#include "viewer/navigation.hpp"
 #include "viewer/settings.hpp"
+#include "viewer/update_callback.hpp"
 
 namespace cumulet::viewer {
 
@@ -55,7 +47,7 @@ struct Stats {
 /// viewer unchanged.
 class Viewer final : private StageHost {
  public:
-  using GetProc = void* (*)(void* user, const char* name);
+  using GetProc = AttachedContext::GetProc;
   /// restore_state: [GL] calls restore the GL state that they found. sharing: resources of viewers that share shader
   /// programs; null: its own.
   Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace = {},
@@ -65,18 +57,18 @@ class Viewer final : private StageHost {
   Viewer& operator=(const Viewer&) = delete;
 
   void attach(GetProc get_proc, void* user);
-  void detach();
-  void context_lost();
-  [[nodiscard]] bool attached() const { return gl_ != nullptr; }
+  void detach() { gl_.detach(); }
+  void context_lost() { gl_.lose(); }
+  [[nodiscard]] bool attached() const { return gl_.find() != nullptr; }
 
-  void load_volume(const VolumeFile& file) { volumes_.load_volume(file); }
-  void set_volume(VolumeAssetPtr volume) { volumes_.set_volume(std::move(volume)); }
+  void load_volume(const VolumeFile& file) { stage_.volumes.load_volume(file); }
+  void set_volume(VolumeAssetPtr volume) { stage_.volumes.set_volume(std::move(volume)); }
   /// Returns the newest volume; null if there is none.
   VolumeAssetPtr volume();
   /// Returns the metadata of the volume or the sequence; null if there is none.
   VolumeInfoPtr volume_info();
   /// Shows the current frame of a sequence instead of the volume. Null: removes the sequence that is shown, if any.
-  void set_sequence(std::shared_ptr<Sequence> sequence) { volumes_.set_sequence(std::move(sequence)); }
+  void set_sequence(std::shared_ptr<Sequence> sequence) { stage_.volumes.set_sequence(std::move(sequence)); }
   using SequenceStatus = SequenceFeed::Status;
   /// sequence() and frame_failure() throw Error(invalid_argument) if the viewer shows no sequence.
   SequenceStatus sequence();
@@ -88,32 +80,34 @@ class Viewer final : private StageHost {
   std::optional<Error> frame_failure(const Instance& instance, std::uint32_t frame);
   /// Shows the newest state of a dynamic volume instead of the volume. Null: removes the dynamic volume that is shown,
   /// if any.
-  void set_live(std::shared_ptr<Live> live) { volumes_.set_live(std::move(live)); }
+  void set_live(std::shared_ptr<Live> live) { stage_.volumes.set_live(std::move(live)); }
   /// [GL] Submits the next state of a dynamic volume from voxels in GL. `live` need not be shown by this viewer. state:
   /// a complete state, or the changes to the last one.
   void set_live_gl(std::shared_ptr<Live> live, const render::GlState& state);
   using LiveStatus = DynamicFeed::Status;
   /// Throws Error(invalid_argument) if the viewer shows no dynamic volume.
-  LiveStatus live();
+  LiveStatus live() { return stage_.volumes.own_live().status(); }
   /// Throws Error(invalid_argument) for an instance that the viewer does not show or that has no dynamic volume.
-  LiveStatus live(const Instance& instance);
+  LiveStatus live(const Instance& instance) { return stage_.volumes.live_of(instance).status(); }
   /// Sets the instance transforms of the viewer's own volume, sequence or dynamic volume: affine, from its own world
   /// space; at least one. A grid that does not suit the new scale is rebuilt.
-  void set_transforms(const std::vector<scene::InstanceTransform>& transforms) { volumes_.set_transforms(transforms); }
-  [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return volumes_.transforms(); }
+  void set_transforms(const std::vector<scene::InstanceTransform>& transforms) {
+    stage_.volumes.set_transforms(transforms);
+  }
+  [[nodiscard]] const std::vector<scene::InstanceTransform>& transforms() const { return stage_.volumes.transforms(); }
   /// World bounds of all instances of a volume.
-  [[nodiscard]] Bounds bounds_of(const VolumeInfo& volume) const { return volumes_.bounds_of(volume); }
+  [[nodiscard]] Bounds bounds_of(const VolumeInfo& volume) const { return stage_.volumes.bounds_of(volume); }
   /// Shows an instance with its current settings, beside the viewer's own volume. Throws Error(invalid_argument) if it
   /// is shown already.
-  void add_instance(std::shared_ptr<Instance> instance);
+  void add_instance(std::shared_ptr<Instance> instance) { stage_.add_instance(std::move(instance)); }
   /// Throws Error(invalid_argument) if the viewer does not show it.
-  void remove_instance(const Instance& instance) { volumes_.remove_instance(instance); }
+  void remove_instance(const Instance& instance) { stage_.volumes.remove_instance(instance); }
   /// Shows a model with its current settings, beside the viewer's own surfaces. Throws Error(invalid_argument) if it is
   /// shown already.
-  void add_model(std::shared_ptr<ModelInstance> model);
+  void add_model(std::shared_ptr<ModelInstance> model) { stage_.add_model(std::move(model)); }
   /// Throws Error(invalid_argument) if the viewer does not show it.
-  void remove_model(const ModelInstance& model);
-  void rebuild();
+  void remove_model(const ModelInstance& model) { stage_.models.remove_model(model); }
+  void rebuild() { stage_.rebuild(); }
   struct Limits {
     unsigned threads = 0;                                   ///< working at a time; 0: all cores
     std::uint64_t memory_bytes = ResourceLimits::no_limit;  ///< for volumes and grids in main memory
@@ -136,41 +130,45 @@ class Viewer final : private StageHost {
   };
   [[nodiscard]] Status status() const;
 
-  void load_surfaces(const FilePath& path);
+  void load_surfaces(const FilePath& path) { stage_.models.load_surfaces(path); }
   /// Shows these at once. Cancels a running load.
-  void show_surfaces(scene::ModelSourcePtr surfaces);
+  void show_surfaces(scene::ModelSourcePtr surfaces) { stage_.models.show_surfaces(std::move(surfaces)); }
   /// Poses these, then shows them. Null: removes the surfaces at once. Cancels a running load.
-  void set_surfaces(SurfaceAssetPtr surfaces);
+  void set_surfaces(SurfaceAssetPtr surfaces) { stage_.models.set_surfaces(std::move(surfaces)); }
   /// Returns the newest surfaces; null if there are none.
-  SurfaceAssetPtr surfaces_asset();
-  void set_surface_settings(const SurfaceSettings& settings);
+  SurfaceAssetPtr surfaces_asset() { return stage_.models.surfaces_asset(); }
+  void set_surface_settings(const SurfaceSettings& settings) { stage_.models.set_surface_settings(settings); }
   /// Copies a camera of the newest surfaces to the viewer's. Throws Error(invalid_argument) if it does not exist.
-  void use_surface_camera(std::size_t index);
+  void use_surface_camera(std::size_t index) { stage_.use_surface_camera(index); }
 
-  void set_grid(const GridSettings& settings) { volumes_.set_grid(settings); }
-  void set_medium(const Medium& medium) { volumes_.set_medium(medium); }
-  void set_ramps(const Ramps& ramps) { volumes_.set_ramps(ramps); }
-  [[nodiscard]] const Ramps& ramps() const { return volumes_.ramps(); }
-  void set_light(const Light& light);
-  void set_lights(light::AnalyticLights analytic_lights);
-  void load_environment(const FilePath& path);
+  void set_grid(const GridSettings& settings) { stage_.volumes.set_grid(settings); }
+  void set_medium(const Medium& medium) { stage_.volumes.set_medium(medium); }
+  void set_ramps(const Ramps& ramps) { stage_.volumes.set_ramps(ramps); }
+  [[nodiscard]] const Ramps& ramps() const { return stage_.volumes.ramps(); }
+  void set_light(const Light& light) { stage_.sky.set_light(light); }
+  void set_lights(light::AnalyticLights lights) { stage_.sky.set_lights(std::move(lights)); }
+  void load_environment(const FilePath& path) { stage_.sky.load_environment(path); }
   /// Null: the sky of the light settings. Cancels a running load.
-  void set_environment(light::EnvironmentPtr environment);
-  void set_environment_settings(const EnvironmentSettings& settings);
+  void set_environment(light::EnvironmentPtr environment) { stage_.sky.set_environment(std::move(environment)); }
+  void set_environment_settings(const EnvironmentSettings& settings) { stage_.sky.set_environment_settings(settings); }
   /// Returns the newest environment; null if there is none.
-  const light::EnvironmentPtr& environment();
-  void set_ground(const GroundSettings& settings);
+  const light::EnvironmentPtr& environment() { return stage_.sky.environment(); }
+  void set_ground(const GroundSettings& settings) { stage_.sky.set_ground(settings); }
   void set_sampling(const Sampling& sampling);
   void set_display(const DisplaySettings& display);
-  void set_camera(std::shared_ptr<Camera> camera);
-  [[nodiscard]] const std::shared_ptr<Camera>& camera() const { return camera_; }
+  void set_camera(std::shared_ptr<Camera> camera) { stage_.camera.set_camera(std::move(camera)); }
+  [[nodiscard]] const std::shared_ptr<Camera>& camera() const { return stage_.camera.camera(); }
   /// Sets the camera of the previous frame, `seconds` ago; null: the camera has not moved.
-  void set_previous_camera(std::shared_ptr<Camera> camera, double seconds);
+  void set_previous_camera(std::shared_ptr<Camera> camera, double seconds) {
+    stage_.camera.set_previous_camera(std::move(camera), seconds);
+  }
   /// Sets the previous transforms of the volume's first instances.
-  void set_previous_transforms(std::vector<scene::InstanceTransform> transforms);
-  void set_navigation(const NavigationSettings& settings);
-  bool input(const InputEvent& event);
-  void frame_all();
+  void set_previous_transforms(std::vector<scene::InstanceTransform> transforms) {
+    stage_.volumes.set_previous_transforms(std::move(transforms));
+  }
+  void set_navigation(const NavigationSettings& settings) { stage_.camera.set_navigation(settings); }
+  bool input(const InputEvent& event) { return stage_.input(event); }
+  void frame_all() { stage_.frame_all(); }
 
   FrameResult render(const Frame& frame);
   /// Compiles the programs that frames like this need and uses each once. all: also compiles all other programs.
@@ -179,7 +177,7 @@ class Viewer final : private StageHost {
   MapResult update_map(const MapRequest& request);
   void drop_map(std::uint32_t slot);
   /// Throws Error(invalid_argument) without a volume or surfaces.
-  Bounds bounds();
+  Bounds bounds() { return stage_.bounds(); }
   void read_light_group(std::uint32_t group, float* rgb, std::size_t count);
   void read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count);
   void read_linear(float* rgba, std::size_t count);
@@ -200,14 +198,14 @@ class Viewer final : private StageHost {
   Stats stats();
 
   /// Calls the host's update callback. Calls are coalesced. Thread-safe.
-  void notify() override;
+  void notify() override { update_.call(); }
 
   /// Returns the shader parameters of the current image; for tests.
   const core::CmParameters& trace_parameters();
   /// Sets a list that receives every completed path-tracing dispatch, or null; for tests.
-  void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl().progressive().tracer().set_log(log); }
+  void set_dispatch_log(std::vector<render::DispatchRecord>* log) { gl_.get().progressive().tracer().set_log(log); }
   /// Limits the texels per page of cell records; 0: the driver's limit; for tests.
-  void set_page_texels(std::int64_t texels) { page_texels_ = texels; }
+  void set_page_texels(std::int64_t texels) { upload_limits_.page_texels = texels; }
   /// Sets the receiver of all requests to workers, or null; for tests.
   void set_job_log(JobLog* log) { jobs_.set_job_log(log); }
   /// Answers of a GL context, for a viewer without one.
@@ -226,99 +224,42 @@ class Viewer final : private StageHost {
   DryRun dry_run(const Frame& frame);
 
  private:
-  [[nodiscard]] Context& gl() const;
-  // Must be called after each change of a setting.
-  void touch() override;
   // True if a worker is busy or has a result that has not been taken.
-  [[nodiscard]] bool busy() const;
-  // Runs the body of a [GL] call with state guard and error handling.
-  template <class Body>
-  void with_gl(Body&& body);
-  void sync() override;
+  [[nodiscard]] bool busy() const { return jobs_.busy() || stage_.volumes.frames_are_due(); }
+  void sync() override { stage_.sync(); }
+  void touch() override;
   [[nodiscard]] bool is_displayed(const scene::SequenceFrame& frame, bool is_rendered) const override;
   void track(const std::shared_ptr<Live>& live) override { dynamic_gl_.track(live); }
+  [[nodiscard]] SequenceStatus status_of(const SequenceFeed& feed) const;
   // Prepares a frame before uploads.
   void prepare(const Frame& frame);
+  [[nodiscard]] Shot shot();
   // Updates the upload progress for status() and stats().
   void follow_upload(const Context& g);
   // Takes the cell counts of GPU-built grids once they are built.
   void take_cells(const Context& g);
-  // Returns the displayed frame of a sequence.
-  [[nodiscard]] static std::optional<scene::SequenceFrame> frame_of(const Context& g, std::uint64_t sequence);
   // Fills in the flags about pending work and failures.
   void report_pending(FrameResult& result);
-  [[nodiscard]] SequenceStatus status_of(const SequenceFeed& feed) const;
-  // Records which state this frame's image shows.
-  static void note_displayed(const Context& g, const VolumeFeedPtr& feed);
-  // Returns the host's tag of an instance or model; 0 for the viewer's own objects.
-  [[nodiscard]] std::uint64_t tag_of(std::uint64_t id) const;
-  // Returns the current scene; the previous snapshot if nothing changed.
-  scene::SnapshotPtr snapshot();
-  Shot shot();
-  [[nodiscard]] std::optional<Bounds> box() const;
-  // World bounds of each displayed object.
-  [[nodiscard]] std::vector<Bounds> boxes() const;
-  // Origin of scene coordinates.
-  [[nodiscard]] glm::dvec3 scene_origin(const std::vector<Bounds>& boxes,
-                                        const std::optional<scene::Ground>& ground) const;
-  // Logs a warning once per scene whose positions lack precision.
-  void remark_on_precision();
   // Logs a warning about non-finite samples: once per image, or only once if previews are on.
   void remark_on_samples(Context& g);
-  // Makes the scene's volumes and lights relative to this origin.
-  void count_from(const glm::dvec3& origin);
-  // all: result of box().
-  [[nodiscard]] std::optional<scene::Ground> ground(const std::optional<Bounds>& all) const;
-  /// Returns the objects to fit a camera to. The result is valid until something changes.
-  [[nodiscard]] std::optional<Subject> subject() const;
-  [[nodiscard]] std::vector<double> seen_reach(const glm::dvec3& direction, std::span<const glm::dvec3> normals) const;
 
   Log log_;
   Trace trace_;
-  std::function<void()> update_;
-  std::atomic<bool> update_pending_ = false;
+  UpdateCallback update_;
   mutable ReportedFailures reported_failures_;
-  bool restore_state_;
   std::atomic<double> upload_progress_ = 1.0;
-  std::shared_ptr<Sharing> sharing_;
-  std::int64_t page_texels_ = 0;
+  Context::UploadLimits upload_limits_{.max_bytes = ResourceLimits::no_limit};
   std::optional<SimulatedGl> simulated_gl_;
-
   Sampling sampling_;
   DisplaySettings display_;
-  denoise::NetworkPtr network_;          // network used last...
-  std::filesystem::path denoiser_file_;  // ...and its file
-  std::shared_ptr<Camera> camera_;
-  std::shared_ptr<void> camera_listener_;
-  Navigation navigation_;
-  std::chrono::steady_clock::time_point last_frame_time_{};
-
-  scene::Snapshot scene_;                  // current scene, from which snapshots are made
-  scene::SnapshotPtr snapshot_;            // newest
-  light::AnalyticLights analytic_lights_;  // set by the host
-  bool analytic_lights_due_ = false;       // the scene's lights are outdated
-  std::vector<std::weak_ptr<const surface::Scene>> remarked_scenes_;
+  denoise::NetworkCache networks_;
   std::optional<std::uint64_t> remarked_picture_;  // the last image with a warning about its samples
-  std::uint64_t last_id_ = 0;
-  std::uint64_t settings_revision_ = 1;
-  glm::uvec2 frame_size_{0U};  // image size of the last frame
-  std::shared_ptr<Camera> previous_camera_;
-  std::shared_ptr<void> previous_listener_;
-  double previous_seconds_ = 0.0;
-  std::optional<ViewFrame> previous_view_;  // view of previous_camera_
-  std::optional<ViewFrame> view_;           // of the last frame
-  std::optional<ViewFrame> traced_view_;    // of the last traced frame
-  std::optional<ViewFrame> last_view_;      // of the traced frame before it
   render::Totals totals_;
-
   DynamicGlBridge dynamic_gl_{[this] { notify(); }};
   std::shared_ptr<ResourceLimits> resource_limits_ = std::make_shared<ResourceLimits>();
-  std::uint64_t max_gl_bytes_ = ResourceLimits::no_limit;
-  std::unique_ptr<Context> gl_;
+  AttachedContext gl_;
   Jobs jobs_;  // its threads use the above
-  VolumeStage volumes_;
-  SkyStage sky_{jobs_.environments, log_};
-  ModelStage models_{jobs_.surfaces, jobs_.poses, reported_failures_, [this] { notify(); }};
+  Stage stage_;
 };
 
 }  // namespace cumulet::viewer

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "base/milliseconds.hpp"
-#include "render/pace.hpp"
+#include "render/dispatch_pacer.hpp"
 #include "support/busy_host.hpp"
 #include "support/c_host.hpp"
 #include "support/fake_gl.hpp"
@@ -71,6 +71,33 @@ TEST(DispatchCostTest, SingleSlowOutlierIsIgnored) {
   for (int i = 0; i < 20; ++i) cost.learn(128.0, 1000.0, 1000.0);
   EXPECT_LT(*cost.most(128.0), 5.0);
   EXPECT_LT(*cost.most(128.0, true), 2.0);
+}
+
+TEST(DispatchPacerTest, DispatchesTakePartOfTheTimeThatIsLeft) {
+  const render::DispatchPacer pacer(deadline_after(1000.0));
+  EXPECT_FALSE(pacer.is_over());
+  // A busy machine may leave less.
+  EXPECT_LE(pacer.left_ms(0.0), 900.0);
+  EXPECT_LE(pacer.left_ms(100.0), 800.0);
+  EXPECT_LE(pacer.max_ms(), render::dispatch_ms);
+  EXPECT_GE(pacer.max_ms(), render::min_ms);
+}
+
+TEST(DispatchPacerTest, ACallWithoutTimeSendsOneDispatch) {
+  const render::InFlightDispatches none(nullptr);
+  render::DispatchPacer pacer(deadline_after(0.0));
+  EXPECT_TRUE(pacer.is_over());
+  EXPECT_LE(pacer.left_ms(0.0), 0.0);
+  EXPECT_EQ(pacer.max_ms(), render::min_ms);
+  EXPECT_TRUE(pacer.must_send(none));
+  pacer.note_sent();
+  EXPECT_FALSE(pacer.must_send(none));
+  EXPECT_FALSE(pacer.wait(none));
+}
+
+TEST(DispatchPacerTest, NothingInFlightIsNotWaitedFor) {
+  const render::InFlightDispatches none(nullptr);
+  EXPECT_FALSE(render::DispatchPacer(deadline_after(1e6)).wait(none));
 }
 
 TEST(TimeReserveTest, OneCallInTwentyMayExceedItsBudget) {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "cumulet/cumulet.h"
+#include "stage/navigation.hpp"
 #include "support/camera_poses.hpp"
-#include "viewer/navigation.hpp"
 
 namespace {
 

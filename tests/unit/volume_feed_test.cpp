@@ -1,4 +1,5 @@
-// Feeds of volumes: a sequence and a dynamic volume, as the viewer's own volume and as instances. Nothing needs GL.
+// Feeds of volumes: a volume in memory, a file, a sequence and a dynamic volume, as the viewer's own volume and as
+// instances. Nothing needs GL.
 
 #include <gtest/gtest.h>
 
@@ -12,19 +13,25 @@
 
 #include "base/error.hpp"
 #include "stage/dynamic_feed.hpp"
+#include "stage/file_feed.hpp"
 #include "stage/sequence_feed.hpp"
 #include "support/clip.hpp"
+#include "support/volumes.hpp"
 #include "volume/memory.hpp"
 
 namespace {
 
 using namespace cumulet;
 using test::Clip;
+using viewer::as_asset;
 using viewer::as_dynamic;
 using viewer::as_sequence;
+using viewer::AssetFeed;
+using viewer::Builder;
 using viewer::BuildSettings;
 using viewer::DynamicFeed;
 using viewer::FeedContext;
+using viewer::FileFeed;
 using viewer::JobContext;
 using viewer::Live;
 using viewer::LiveBuilder;
@@ -230,7 +237,7 @@ TEST_F(SequenceFeeds, TheViewersOwnUsesTheSuggestedDensityScale) {
   const auto it = feed(sequence(true), settings_of_scale(123.0), Suggestion::used_if_asked);
   wait(*it);
   ASSERT_TRUE(it->take_info());
-  const auto scale = it->density_scale_to_use();
+  const auto scale = it->suggested_density_scale();
   ASSERT_TRUE(scale);
   EXPECT_EQ(it->status(std::nullopt).density_scale, scale);
   ASSERT_TRUE(it->settings());
@@ -244,7 +251,7 @@ TEST_F(SequenceFeeds, TheSuggestionIsUsedOnlyIfItIsAskedFor) {
   const auto it = feed(sequence(false), settings_of_scale(123.0), Suggestion::used_if_asked);
   wait(*it);
   ASSERT_TRUE(it->take_info());
-  EXPECT_FALSE(it->density_scale_to_use());
+  EXPECT_FALSE(it->suggested_density_scale());
   EXPECT_TRUE(it->status(std::nullopt).density_scale);
   EXPECT_EQ(it->settings(), settings_of_scale(123.0));
 }
@@ -253,7 +260,7 @@ TEST_F(SequenceFeeds, InstancesIgnoreTheSuggestion) {
   const auto it = feed(sequence(true), settings_of_scale(123.0), Suggestion::ignored);
   wait(*it);
   ASSERT_TRUE(it->take_info());
-  EXPECT_FALSE(it->density_scale_to_use());
+  EXPECT_FALSE(it->suggested_density_scale());
   EXPECT_EQ(it->settings(), settings_of_scale(123.0));
   ASSERT_EQ(it->take(true), Taken::other);
   EXPECT_EQ(it->built()->settings.refine.density_scale, 123.0);
@@ -263,7 +270,7 @@ TEST_F(SequenceFeeds, TheSuggestionNeedsNoSettings) {
   const auto it = feed(sequence(true), std::nullopt, Suggestion::used_if_asked);
   wait(*it);
   ASSERT_TRUE(it->take_info());
-  EXPECT_TRUE(it->density_scale_to_use());
+  EXPECT_TRUE(it->suggested_density_scale());
   EXPECT_FALSE(it->settings());
 }
 
@@ -535,7 +542,7 @@ TEST_F(DynamicFeeds, MediaKeepTheirDensityScale) {
   const auto it = feed(settings_of_scale(123.0));
   submit(1.0F);
   ASSERT_EQ(it->take(true), Taken::other);
-  EXPECT_FALSE(it->density_scale_to_use());
+  EXPECT_FALSE(it->suggested_density_scale());
   EXPECT_EQ(it->built()->settings.refine.density_scale, 123.0);
 }
 
@@ -562,6 +569,110 @@ TEST_F(DynamicFeeds, KindsAreToldApart) {
   EXPECT_EQ(as_sequence(it), nullptr);
   EXPECT_EQ(as_dynamic(nullptr), nullptr);
   EXPECT_EQ(as_sequence(nullptr), nullptr);
+}
+
+// ---- volumes in memory, and files ----
+
+class AssetFeeds : public Feeds {
+ protected:
+  static viewer::VolumeAssetPtr cloud(int seed = 1) {
+    return std::make_shared<const viewer::VolumeAsset>(test::noise_volume({8, 8, 8}, glm::ivec3(0), seed));
+  }
+  [[nodiscard]] std::shared_ptr<AssetFeed> feed(const viewer::VolumeAssetPtr& volume) {
+    return std::make_shared<AssetFeed>(volume, builder_, context());
+  }
+  [[nodiscard]] std::shared_ptr<FileFeed> feed(const std::string& path, bool suggests = false,
+                                               const std::optional<BuildSettings>& settings = BuildSettings{}) {
+    viewer::VolumeFile file;
+    file.path = FilePath(path);
+    file.suggested_density_scale = suggests;
+    return std::make_shared<FileFeed>(file, settings, std::nullopt, builder_, context());
+  }
+  void wait() const { EXPECT_TRUE(builder_->wait(std::nullopt)); }
+
+  std::shared_ptr<Builder> builder_ = std::make_shared<Builder>(JobContext{{}, [] {}});
+  Clip clip_{1};
+};
+
+TEST_F(AssetFeeds, AreKnownBeforeTheyAreBuilt) {
+  const viewer::VolumeAssetPtr volume = cloud();
+  const auto it = feed(volume);
+  EXPECT_EQ(it->volume(), volume);
+  EXPECT_EQ(it->info(), volume->volume_info());
+  EXPECT_EQ(it->source(), volume.get());
+  EXPECT_FALSE(it->take_info());
+  EXPECT_FALSE(it->built());
+  EXPECT_EQ(it->take(true), Taken::nothing);
+  EXPECT_EQ(as_asset(it), it.get());
+  EXPECT_EQ(as_sequence(it), nullptr);
+  EXPECT_EQ(as_dynamic(it), nullptr);
+}
+
+TEST_F(AssetFeeds, BuildAGridAtARequest) {
+  const viewer::VolumeAssetPtr volume = cloud();
+  const auto it = feed(volume);
+  it->request(std::nullopt);  // it depends on a view
+  wait();
+  EXPECT_EQ(it->take(true), Taken::nothing);
+  it->request(settings_of_scale(2.0));
+  wait();
+  ASSERT_EQ(it->take(false), Taken::other);
+  EXPECT_EQ(it->built()->volume, volume);
+  EXPECT_EQ(it->built()->settings, settings_of_scale(2.0));
+  EXPECT_FALSE(it->frame());
+  EXPECT_FALSE(it->waits());
+  EXPECT_FALSE(it->is_due());
+  EXPECT_EQ(it->take(false), Taken::nothing);
+}
+
+TEST_F(AssetFeeds, AGridOfAFormerVolumeIsTaken) {
+  const viewer::VolumeAssetPtr first = cloud(1);
+  feed(first)->request(BuildSettings{});
+  wait();
+  const auto it = feed(cloud(2));
+  ASSERT_EQ(it->take(true), Taken::former);
+  EXPECT_EQ(it->built()->volume, first);
+  it->request(BuildSettings{});
+  wait();
+  ASSERT_EQ(it->take(true), Taken::other);
+  EXPECT_EQ(it->built()->volume, it->volume());
+}
+
+TEST_F(AssetFeeds, FilesHaveNoVolumeUntilTheyAreRead) {
+  const auto it = feed(clip_.path(0));
+  EXPECT_EQ(it->volume(), nullptr);
+  EXPECT_EQ(it->info(), nullptr);
+  wait();
+  ASSERT_TRUE(it->take_volume());
+  EXPECT_FALSE(it->take_volume());
+  ASSERT_NE(it->volume(), nullptr);
+  EXPECT_FALSE(it->suggested_density_scale());
+  ASSERT_EQ(it->take(true), Taken::other);
+  EXPECT_EQ(it->built()->volume, it->volume());
+  EXPECT_FALSE(it->proxy());
+  EXPECT_FALSE(it->loads_after_proxy());
+}
+
+TEST_F(AssetFeeds, FilesSuggestADensityScaleOnce) {
+  const auto it = feed(clip_.path(0), true, settings_of_scale(123.0));
+  wait();
+  ASSERT_TRUE(it->take_volume());
+  const std::optional<double> scale = it->suggested_density_scale();
+  ASSERT_TRUE(scale);
+  ASSERT_EQ(it->take(true), Taken::other);
+  EXPECT_EQ(it->built()->settings.refine.density_scale, *scale);
+  EXPECT_EQ(it->take_suggestion(), scale);
+  EXPECT_FALSE(it->suggested_density_scale());
+  EXPECT_FALSE(it->take_suggestion());
+}
+
+TEST_F(AssetFeeds, AFileThatCannotBeReadGivesNothing) {
+  clip_.corrupt(0);
+  const auto it = feed(clip_.path(0));
+  wait();
+  EXPECT_FALSE(it->take_volume());
+  EXPECT_EQ(it->take(true), Taken::nothing);
+  EXPECT_TRUE(it->jobs()->status().failure);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "viewer/navigation.hpp"
+#include "stage/navigation.hpp"
 
 #include <algorithm>
 #include <cmath>
