@@ -37,11 +37,13 @@ double density_scale_in(double unit, const volume::ScalarVolume& voxels, const g
   return max_value > 0.0 ? std::min(scale * unit, scene::max_extinction(edge) / max_value) : scale * unit;
 }
 
+bool interpolates(const BuildSettings& settings) { return settings.interpolation == grid::Interpolation::linear; }
+
 }  // namespace
 
 bool needs_values(const VolumeAsset& volume, const BuildSettings& settings) {
-  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty() ||
-         volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
+  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || interpolates(settings) ||
+         !settings.density_ramp.empty() || volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
 }
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -64,7 +66,9 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.moves = volume->moves();
   Stopwatch watch;
   const VolumeAssetPtr moving = open_of(volume, settings.shutter_seconds, progress);
-  const VolumeAsset& shown = moving ? *moving : *volume;
+  const VolumeAssetPtr& voxels_shown = moving ? moving : volume;
+  const VolumeAssetPtr asset = interpolates(settings) ? voxels_shown->interpolated() : voxels_shown;
+  const VolumeAsset& shown = *asset;
   if (moving && 0.5 * settings.shutter_seconds * volume->fastest() > volume::farthest_voxels)
     log.info(volume->name() + ": motion blur is limited to 64 voxels per half shutter time");
   const double taken = watch.lap();
@@ -85,15 +89,17 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     built.seconds.records = watch.lap();
     return built;
   }
-  if (settings.on == BuildOn::gpu && moving)
-    log.info(volume->name() + ": its grid is built on the CPU because it has motion blur");
+  const bool gpu_can = !moving && !interpolates(settings);
+  if (settings.on == BuildOn::gpu && !gpu_can)
+    log.info(volume->name() + ": its grid is built on the CPU because it has " +
+             (moving ? "motion blur" : "linear interpolation"));
   const Carried carried = Carried::of(channels);
   const std::uint64_t max_cells = settings.refine.max_cells;
   grid::RefineSettings refine = settings.refine;
   refine.density_scale = density_scale_in(unit, *voxels, statistics->cube(), settings.refine.density_scale);
   grid::LatticePtr lattice;
   std::optional<std::uint64_t> planned;
-  if (settings.on == BuildOn::gpu && !moving) {
+  if (settings.on == BuildOn::gpu && gpu_can) {
     lattice = volume->lattice(settings.density_ramp, channels, refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), resource_limits);
     if (!planned && in_gl) {
