@@ -260,10 +260,9 @@ void main() {
     float clear = 1.0;
     CmWalk walk = cm_walk(o, d, surface_t, true);
     // Beyond e^-40 nothing remains visible.
-    for (int j = 0; j < 100000 && used < 40.0; ++j) {
-      float t_1;
-      CmBernstein e;
-      if (!cm_walk_part(walk, t_1, e)) break;
+    float t_1;
+    CmBernstein e;
+    for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e); ++j) {
       float t = walk.t;
       float span = t_1 - t;
       float depth = cm_depth_of(e, span, walk.t_end - t);

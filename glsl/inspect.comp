@@ -178,10 +178,9 @@ void main() {
     float used = 0.0;
     vec3 lines = vec3(0.0);
     float clear = 1.0;
-    for (int i = 0; i < 100000 && clear > 0.02; ++i) {
-      float t_1;
-      CmBernstein e;
-      if (!cm_walk_part(walk, t_1, e)) break;
+    float t_1;
+    CmBernstein e;
+    for (int i = 0; i < 100000 && clear > 0.02 && cm_walk_part(walk, t_1, e); ++i) {
       float t = walk.t;
       float span = t_1 - t;
       float depth = cm_segment_mean(e) * span;

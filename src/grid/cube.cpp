@@ -33,7 +33,8 @@ Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, 
     throw Error(ErrorCode::unsupported, "grid '" + volume.name + "' is " + std::to_string(extent) +
                                             " voxels wide; the limit is " + std::to_string(1 << Cube::max_log2_size));
   }
-  cube.to_world = volume.index_to_world * glm::translate(glm::dmat4(1.0), glm::dvec3(cube.origin) - (interpolated ? 0.0 : 0.5));
+  cube.to_world =
+      volume.index_to_world * glm::translate(glm::dmat4(1.0), glm::dvec3(cube.origin) - (interpolated ? 0.0 : 0.5));
   return cube;
 }
 

@@ -31,8 +31,8 @@ struct Cube {
 
 /// Returns the control cube for these inclusive index-space bounds. For a GPU-resident volume the origin is aligned to
 /// two bricks. With linear interpolation the cube also holds the boxes around the bounds, in which the field falls to
-/// the background. Throws Error(unsupported) if the bounds are wider than 2^18 voxels, and Error(file) if the transform is
-/// singular.
+/// the background. Throws Error(unsupported) if the bounds are wider than 2^18 voxels, and Error(file) if the transform
+/// is singular.
 Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, const glm::ivec3& bounds_max,
               Interpolation interpolation = Interpolation::nearest);
 inline Cube fit_cube(const volume::ScalarVolume& volume, Interpolation interpolation = Interpolation::nearest) {

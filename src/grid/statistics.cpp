@@ -482,10 +482,9 @@ std::vector<ivec3> occupied_bricks(const volume::ScalarVolume& volume, bool inte
 std::array<std::uint32_t, 9> sort_by_octant(const std::vector<ivec3>& origins, std::vector<std::uint32_t>& bricks,
                                             std::uint32_t first, std::uint32_t last, const ivec3& middle) {
   const auto split = [&](std::uint32_t from, std::uint32_t to, int axis) {
-    return static_cast<std::uint32_t>(
-        std::partition(bricks.begin() + from, bricks.begin() + to,
-                       [&](std::uint32_t b) { return origins[b][axis] < middle[axis]; }) -
-        bricks.begin());
+    return static_cast<std::uint32_t>(std::partition(bricks.begin() + from, bricks.begin() + to,
+                                                     [&](std::uint32_t b) { return origins[b][axis] < middle[axis]; }) -
+                                      bricks.begin());
   };
   std::array<std::uint32_t, 9> ends{};
   ends[0] = first;

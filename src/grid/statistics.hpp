@@ -53,7 +53,7 @@ struct BrickTree {
 
   /// The axes of a leaf's frame in the 9^3 lattice points of a brick, for interpolation.
   struct Leaf {
-    std::uint16_t first;              ///< index of its vertex 0
+    std::uint16_t first;               ///< index of its vertex 0
     std::array<std::int16_t, 3> step;  ///< of the index, along each axis of its frame
     std::array<std::int8_t, 3> axis;   ///< axis of the cube; negative direction: ~axis
   };

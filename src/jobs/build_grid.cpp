@@ -29,6 +29,11 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
   }
 }
 
+// Returns the volume with the interpolation of these settings.
+VolumeAssetPtr field_of(const VolumeAssetPtr& volume, const BuildSettings& settings) {
+  return settings.interpolation == grid::Interpolation::linear ? volume->interpolated() : volume;
+}
+
 // Density scale for values in `unit`, limited to the maximum extinction of path tracing.
 double density_scale_in(double unit, const volume::ScalarVolume& voxels, const grid::Cube& cube, double scale) {
   const glm::dmat3 axes(cube.to_world);
@@ -38,6 +43,15 @@ double density_scale_in(double unit, const volume::ScalarVolume& voxels, const g
 }
 
 bool interpolates(const BuildSettings& settings) { return settings.interpolation == grid::Interpolation::linear; }
+
+// Returns whether the GPU builds a tetrahedral grid; logs the reason if the CPU builds it instead.
+bool builds_on_gpu(const Log& log, const VolumeAsset& volume, const BuildSettings& settings, bool moves) {
+  if (settings.on != BuildOn::gpu) return false;
+  if (!moves && !interpolates(settings)) return true;
+  log.info(volume.name() + ": its grid is built on the CPU because it has " +
+           (moves ? "motion blur" : "linear interpolation"));
+  return false;
+}
 
 }  // namespace
 
@@ -66,8 +80,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.moves = volume->moves();
   Stopwatch watch;
   const VolumeAssetPtr moving = open_of(volume, settings.shutter_seconds, progress);
-  const VolumeAssetPtr& voxels_shown = moving ? moving : volume;
-  const VolumeAssetPtr asset = interpolates(settings) ? voxels_shown->interpolated() : voxels_shown;
+  const VolumeAssetPtr asset = field_of(moving ? moving : volume, settings);
   const VolumeAsset& shown = *asset;
   if (moving && 0.5 * settings.shutter_seconds * volume->fastest() > volume::farthest_voxels)
     log.info(volume->name() + ": motion blur is limited to 64 voxels per half shutter time");
@@ -89,17 +102,14 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     built.seconds.records = watch.lap();
     return built;
   }
-  const bool gpu_can = !moving && !interpolates(settings);
-  if (settings.on == BuildOn::gpu && !gpu_can)
-    log.info(volume->name() + ": its grid is built on the CPU because it has " +
-             (moving ? "motion blur" : "linear interpolation"));
+  const bool on_gpu = builds_on_gpu(log, *volume, settings, moving != nullptr);
   const Carried carried = Carried::of(channels);
   const std::uint64_t max_cells = settings.refine.max_cells;
   grid::RefineSettings refine = settings.refine;
   refine.density_scale = density_scale_in(unit, *voxels, statistics->cube(), settings.refine.density_scale);
   grid::LatticePtr lattice;
   std::optional<std::uint64_t> planned;
-  if (settings.on == BuildOn::gpu && gpu_can) {
+  if (on_gpu) {
     lattice = volume->lattice(settings.density_ramp, channels, refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), resource_limits);
     if (!planned && in_gl) {

@@ -41,8 +41,8 @@ bool holds_motion(const gl::Limits& limits, const ivec3& size) {
   return std::max({size.x, size.y, size.z}) <= limits.texture_size_3d && voxels.x * voxels.y * voxels.z <= most;
 }
 
-// Calls put(index in the slices, value) for each voxel of the slices [first, last) of a dense volume. Voxels outside the
-// cube are 0 and left out.
+// Calls put(index in the slices, value) for each voxel of the slices [first, last) of a dense volume. Voxels outside
+// the cube are 0 and left out.
 template <class Put>
 void for_slab(const scene::MarchSource& source, const grid::Statistics& statistics, int first, int last,
               const Put& put) {

@@ -78,7 +78,8 @@ TEST_P(InterpolatedImage, EmissionMatchesItsIntegral) {
   viewer->set_medium(medium);
   for (const dvec3& at : {dvec3(3.4, 4.9, 0.0), dvec3(-0.4, 7.2, 0.0), dvec3(8.5, 3.5, 0.0)}) {
     double expected = 0.0;
-    for (int i = 0; i < 20000; ++i) expected += 11.0 / 20000.0 * test::value_between(flame, {at.x, at.y, -1.0 + 11.0 * (i + 0.5) / 20000.0});
+    for (int i = 0; i < 20000; ++i)
+      expected += 11.0 / 20000.0 * test::value_between(flame, {at.x, at.y, -1.0 + 11.0 * (i + 0.5) / 20000.0});
     for (const test::MarchKind& kind : {test::march_kinds[2], test::march_kinds[3]}) {
       viewer->set_grid(between(kind));
       viewer->set_camera(along_z(at.x, at.y));

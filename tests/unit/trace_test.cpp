@@ -133,13 +133,14 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
   const test::TrackedMedium medium;
   const auto viewer = make();
   viewer->set_volume(volume);
-  viewer->set_medium({medium.scale, vec3(medium.albedo), {static_cast<float>(medium.anisotropy)}, 0,
-                      vec3(medium.emission)});
+  viewer->set_medium(
+      {medium.scale, vec3(medium.albedo), {static_cast<float>(medium.anisotropy)}, 0, vec3(medium.emission)});
   viewer->set_light({40.0F, 25.0F, vec3(medium.irradiance), vec3(medium.sky)});
   viewer->set_camera(test::camera_at(eye, target, fovy));
   for (const auto interpolation : {grid::Interpolation::nearest, grid::Interpolation::linear}) {
     test::DeltaTracker reference(volume, interpolation, medium);
-    const test::TrackedMean expected = reference.view(eye, target, fovy, interpolation == grid::Interpolation::linear ? 100000 : 400000);
+    const test::TrackedMean expected =
+        reference.view(eye, target, fovy, interpolation == grid::Interpolation::linear ? 100000 : 400000);
     for (const test::MarchKind& kind : test::march_kinds) {
       viewer::GridSettings settings = test::settings_of(kind);
       settings.build.interpolation = interpolation;

@@ -2122,8 +2122,8 @@ typedef enum cumulet_cell_density {
 typedef enum cumulet_interpolation {
   CUMULET_INTERPOLATION_NEAREST = 0, /**< A voxel is a cube of constant value. */
   /**
-   * A voxel is a sample at its center, with trilinear interpolation between centers. The field ends half a voxel outside
-   * the voxels' box. Ramps and the emission of temperatures apply to voxels. The CPU builds tetrahedral grids.
+   * A voxel is a sample at its center, with trilinear interpolation between centers. The field ends half a voxel
+   * outside the voxels' box. Ramps and the emission of temperatures apply to voxels. The CPU builds tetrahedral grids.
    */
   CUMULET_INTERPOLATION_LINEAR = 1
 } cumulet_interpolation;

@@ -1,7 +1,7 @@
 #pragma once
 
-// An independent path tracer: delta tracking over the voxels, no NEE towards the sky, no Russian roulette; transmittance
-// towards the sun by delta tracking. It shares only the definition of the medium with glsl/.
+// An independent path tracer: delta tracking over the voxels, no NEE towards the sky, no Russian roulette;
+// transmittance towards the sun by delta tracking. It shares only the definition of the medium with glsl/.
 
 #include <algorithm>
 #include <cmath>
@@ -71,8 +71,8 @@ class DeltaTracker {
     glm::dvec3 sum(0.0);
     glm::dvec3 square(0.0);
     for (int i = 0; i < paths; ++i) {
-      const glm::dvec3 d = glm::normalize(forward + tangent * (2.0 * uniform() - 1.0) * right +
-                                          tangent * (2.0 * uniform() - 1.0) * up);
+      const glm::dvec3 d =
+          glm::normalize(forward + tangent * (2.0 * uniform() - 1.0) * right + tangent * (2.0 * uniform() - 1.0) * up);
       const glm::dvec3 radiance = path(eye, d);
       sum += radiance;
       square += radiance * radiance;
