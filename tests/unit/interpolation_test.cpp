@@ -340,9 +340,9 @@ TEST(InterpolatedVoxels, TraversalMatchesQuadrature) {
 
 TEST(InterpolatedVoxels, CellsHoldTheFieldBesideTheBounds) {
   const auto volume =
-      test::make_volume({3, 1, 1}, ivec3(7, 7, 7), [](const ivec3& p) { return p.x == 8 ? 4.0F : 2.0F; });
+      test::make_volume({3, 1, 1}, ivec3(8, 8, 8), [](const ivec3& p) { return p.x == 9 ? 4.0F : 2.0F; });
   const Source dense = source_of(volume, scene::March::dense);
-  EXPECT_EQ(dense.of.box_low + dense.of.cube.origin, ivec3(6));
+  EXPECT_EQ(dense.of.box_low + dense.of.cube.origin, ivec3(7));
   EXPECT_EQ(dense.of.box_size, ivec3(4, 2, 2));
   EXPECT_EQ(dense.of.voxel_count(), ivec3(5, 3, 3));
   const Source packed = source_of(volume, scene::March::brick);
