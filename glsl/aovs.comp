@@ -111,7 +111,7 @@ vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
     float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
     vec3 then = p;
     if (CM_GRID.moves != 0u)
-      then -= cm_motion_frame.seconds * cm_to_cube(cm_out_of_volume(cm_march_velocity(front.cell.xy)));
+      then -= cm_motion_frame.seconds * cm_to_cube(cm_out_of_volume(cm_march_velocity(front.cell.xy, cm_front_middle(walk.o, walk.d, front))));
     motion += extinction * cm_backward_point(p, then, CM_MOTION_VOLUMES + front.volume);
     sum += extinction;
   }
@@ -142,9 +142,10 @@ float cm_depth_to_far(vec3 from, vec3 d) {
 #endif
   float used = 0.0;
   CmWalk walk = cm_walk(o, cm_to_cube(d), 3.0e38, false);
-  float t_1, e_0, e_1;
-  for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e_0, e_1); ++j) {
-    used += cm_depth_of(e_0, e_1, t_1 - walk.t, t_1 - walk.t);
+  float t_1;
+  CmBernstein e;
+  for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e); ++j) {
+    used += cm_depth_of(e, t_1 - walk.t, t_1 - walk.t);
     cm_walk_on(walk, t_1);
   }
   return used;
@@ -259,14 +260,14 @@ void main() {
     float clear = 1.0;
     CmWalk walk = cm_walk(o, d, surface_t, true);
     // Beyond e^-40 nothing remains visible.
-    for (int j = 0; j < 100000 && used < 40.0; ++j) {
-      float t_1, e_0, e_1;
-      if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+    float t_1;
+    CmBernstein e;
+    for (int j = 0; j < 100000 && used < 40.0 && cm_walk_part(walk, t_1, e); ++j) {
       float t = walk.t;
       float span = t_1 - t;
-      float depth = cm_depth_of(e_0, e_1, span, walk.t_end - t);
+      float depth = cm_depth_of(e, span, walk.t_end - t);
       if (i == 0 && volume_z == CM_INFINITE && used + depth >= 0.69314718) {
-        volume_z = (t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used)) / t_per_z;
+        volume_z = (t + cm_depth_distance(e, span, 0.69314718 - used)) / t_per_z;
       }
       used += depth;
       // Scattering in this segment: its probability, and its mean position, as if extinction were constant.

@@ -155,15 +155,20 @@ layout(binding = CM_UNIT_CHANGE_VOXELS) uniform sampler3D cm_voxel_changes;
 float cm_voxel_change(ivec3 voxel) { return texelFetch(cm_voxel_changes, voxel - ivec3(CM_GRID.box_min), 0).x; }
 #endif
 #else
+#if CM_LINEAR
+#define CM_BRICK_VOXELS 729u
+#else
+#define CM_BRICK_VOXELS 512u
+#endif
 layout(binding = CM_UNIT_VOXELS) uniform samplerBuffer cm_brick_values;
 layout(binding = CM_UNIT_BRICK_SLOTS) uniform usampler3D cm_brick_slots;
 uint cm_brick_slot(ivec3 brick) {
   return texelFetch(cm_brick_slots, brick - (ivec3(CM_GRID.box_min) >> 3), 0).x;
 }
-float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * 512u + index)).x; }
+float cm_brick_voxel(uint slot, uint index) { return texelFetch(cm_brick_values, int(slot * CM_BRICK_VOXELS + index)).x; }
 #if CM_MOTION
 layout(binding = CM_UNIT_CHANGE_VOXELS) uniform samplerBuffer cm_brick_changes;
-float cm_brick_change(uint slot, uint index) { return texelFetch(cm_brick_changes, int(slot * 512u + index)).x; }
+float cm_brick_change(uint slot, uint index) { return texelFetch(cm_brick_changes, int(slot * CM_BRICK_VOXELS + index)).x; }
 #endif
 #endif
 #endif

@@ -37,6 +37,14 @@ struct CmEmission {
   float at_0;
   float slope;
   float distance;  // cm_cell_distance of o
+#if CM_CUBIC
+  // The emission of the corners of a cell, and the ray relative to the cell; the mean is then a factor.
+  CmCellCorners red;
+  CmCellCorners green;
+  CmCellCorners blue;
+  vec3 o;
+  vec3 d;
+#endif
 };
 
 CM_FN CmEmission cm_cell_emission(uvec4 record, CmFrame f, uint shape) {
@@ -66,10 +74,23 @@ CM_FN float cm_emission_at(uvec4 record, uint cell_class, vec3 point) {
   return max(0.0f, 1.0f + dot(cm_emission_gradient(record), point - cm_frame_centroid(cell_class)));
 }
 
+#if CM_CUBIC
+CM_FN vec3 cm_corner_emission(CmEmission e, float t) {
+  vec3 at = clamp(e.o + t * e.d, vec3(0.0f, 0.0f, 0.0f), vec3(1.0f, 1.0f, 1.0f));
+  return vec3(cm_trilinear(e.red, at), cm_trilinear(e.green, at), cm_trilinear(e.blue, at));
+}
+#endif
+
 // Emission that a ray collects from t to t_1, without absorption.
 CM_FN vec3 cm_emitted(CmEmission e, float t, float t_1) {
+#if CM_CUBIC
+  // Simpson's rule is exact for cubics.
+  vec3 sum = cm_corner_emission(e, t) + 4.0f * cm_corner_emission(e, 0.5f * (t + t_1)) + cm_corner_emission(e, t_1);
+  return e.mean * sum * (max(0.0f, t_1 - t) / 6.0f);
+#else
   float share = 0.5f * (max(0.0f, e.at_0 + e.slope * t) + max(0.0f, e.at_0 + e.slope * t_1));
   return e.mean * (share * max(0.0f, t_1 - t));
+#endif
 }
 
 // Mean cosine of scattering: 16 bits per cell, two cells per word.

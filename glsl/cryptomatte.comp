@@ -116,11 +116,12 @@ void main() {
     CmWalk walk = cm_walk(ray.o, ray.d, solid_t, true);
     // Beyond e^-40 nothing remains visible.
     for (int j = 0; j < 100000 && used < 40.0; ++j) {
-      float t_1, e_0, e_1;
-      if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+      float t_1;
+      CmBernstein e;
+      if (!cm_walk_part(walk, t_1, e)) break;
       float way = walk.t_end - walk.t;
       float span = t_1 - walk.t;
-      float depth = cm_depth_of(e_0, e_1, span, way);
+      float depth = cm_depth_of(e, span, way);
       used += depth;
       float probability = 1.0 - exp(-depth);
       // Splits the probability by the volumes' extinctions at the mean position of scattering.

@@ -15,11 +15,10 @@ struct CmExtinction {
 CM_FN float cm_extinction_here(vec3 o, vec3 d, uvec3 cell) {
   CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
   float t_1;
-  float r_0;
-  float r_1;
+  CmBernstein r;
   uvec3 next;
-  cm_march_step(cell, ray, 0.0f, t_1, r_0, r_1, next);
-  return CM_MEDIUM.extinction * r_0;
+  cm_march_step(cell, ray, 0.0f, t_1, r, next);
+  return CM_MEDIUM.extinction * r.x;
 }
 
 // Extinction at p.o. cell: without CM_INSTANCES the cell of p.o, CM_NONE if it has none. seen: only volumes visible to

@@ -2,17 +2,17 @@
 // provides what glsl/path.glsl asks for, and
 //   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that contains point p of cube space
 //   CmMarchRay cm_march_ray(vec3 o, vec3 d)
-//   void cm_march_step(uvec3 cell, CmMarchRay ray, t, t_1, r_0, r_1, next)
-// The step returns the end t_1 of the ray's segment in the cell, which begins at t; the density at both ends (linear
-// between them); and the next cell. next.x is CM_NONE outside the grid, or where nothing lies ahead. The third word of
+//   void cm_march_step(uvec3 cell, CmMarchRay ray, t, t_1, CmBernstein r, next)
+// The step returns the end t_1 of the ray's segment in the cell, which begins at t; the density r along it
+// (segment.glsl); and the next cell. next.x is CM_NONE outside the grid, or where nothing lies ahead. The third word of
 // a cell is a cache of the traversal, CM_NONE if it is empty. With CM_CHANNELS also
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
-//   vec3 cm_march_color(uvec2 cell)              scattering color
-//   float cm_march_anisotropy(uvec2 cell)         mean cosine of scattering
+//   vec3 cm_march_color(uvec2 cell, vec3 p)        scattering color at point p of cube space in the cell
+//   float cm_march_anisotropy(uvec2 cell, vec3 p)   mean cosine of scattering
 //
 // Free-flight distances are sampled exactly ("regular tracking" in Novak et al., "Monte Carlo Methods for Volumetric
 // Light Transport Simulation", 2018). An optical depth -ln(1 - u) is used up along the traversal. In a cell the depth
-// is a quadratic in t and is inverted in closed form. There is no majorant and no step size.
+// is a quadratic in t and is inverted in closed form, or a quartic whose root is found to rounding (segment.glsl). There is no majorant and no step size.
 //
 // The emission of cells is integrated along scattered rays up to their end (Simon, Hanika, Zirr and Dachsbacher, "Line
 // Integration for Rendering Heterogeneous Emissive Volumes", EGSR 2017). A ray gets as far as t with a probability
@@ -61,8 +61,8 @@ CM_FN void cm_weigh(CM_INOUT(CmPath) p) {
   vec3 share = CM_MEDIUM.albedo;
   float anisotropy = CM_MEDIUM.anisotropy;
 #if CM_CHANNELS
-  if (CM_MEDIUM.colored != 0u) share *= cm_march_color(there.cell);
-  if (CM_MEDIUM.anisotropic != 0u) anisotropy = cm_march_anisotropy(there.cell);
+  if (CM_MEDIUM.colored != 0u) share *= cm_march_color(there.cell, cm_in_volume_point(p.o));
+  if (CM_MEDIUM.anisotropic != 0u) anisotropy = cm_march_anisotropy(there.cell, cm_in_volume_point(p.o));
 #endif
   p.light *= share * (there.extinction * cm_equiangular_weight(pdf, there.extinction) *
                       cm_medium_phase(anisotropy, dot(p.w, to_light)));
@@ -170,8 +170,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
   // Values of the last cell.
-  float r_0 = 0.0f;
-  float r_1 = 0.0f;
+  CmBernstein r = CmBernstein(0.0f);
   float span = 0.0f;
 #if CM_CHANNELS
   CmEmission emission;
@@ -184,16 +183,16 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   for (int i = 0; i < CM_CHUNK && event == CM_EVENT_NONE; ++i) {
     float t_1 = 0.0f;
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
-    cm_march_step(cell, ray, p.t, t_1, r_0, r_1, next);
+    cm_march_step(cell, ray, p.t, t_1, r, next);
 #if CM_CHANNELS
     emission = cm_march_emission(cell, o, d);
     emission.mean *= cm_balance(scattering_pdf, nee_pdf * cm_cell_pdf(emission));
 #endif
     p.steps += 1u;
     span = t_1 - p.t;
-    float used = extinction * (0.5f * (r_0 + r_1) * span);
+    float used = extinction * (cm_segment_mean(r) * span);
     // Only up to a surface or light inside the cell.
-    if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(extinction * r_0, extinction * r_1, span, p.t_end - p.t);
+    if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(extinction * r, span, p.t_end - p.t);
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
     } else {
@@ -208,20 +207,19 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   }
   p.cell = uvec2(cell.x, cell.y);
   p.cache = cell.z;
-  float e_0 = extinction * r_0;
-  float e_1 = extinction * r_1;
+  CmBernstein e = extinction * r;
   // This follows the loop, because software drivers execute both sides of every branch in each step.
   if (event == CM_EVENT_COLLISION) {
     float left = p.t_end - p.t;
-    float way = cm_depth_distance(e_0, e_1, span, p.depth);
+    float way = cm_depth_distance(e, span, p.depth);
 #if CM_CHANNELS
     emitted += cm_emitted(emission, p.t, p.t + min(way, left));
 #endif
     p.t += way;
-    p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e_0, e_1, span, left));
+    p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e, span, left));
     if (way >= left) event = CM_EVENT_ESCAPE;  // behind a surface
   } else if (CM_SURFACES == 0 && event == CM_EVENT_ESCAPE && p.t > p.t_end) {
-    p.depth += cm_depth_of(e_1, e_0, span, p.t - p.t_end);
+    p.depth += cm_depth_of(cm_segment_reversed(e), span, p.t - p.t_end);
   }
 #if CM_CHANNELS
   bool takes = p.ray == CM_RAY_SCATTERED && !cm_is_dark(p);

@@ -97,10 +97,11 @@ CmFaces cm_faces(uvec3 cell, vec3 p) {
 }
 
 float cm_density_at(uvec3 cell, vec3 p) {
-  float t_1, r_0, r_1;
+  float t_1;
+  CmBernstein r;
   uvec3 next;
-  cm_march_step(cell, cm_march_ray(p, vec3(1.0, 0.0, 0.0)), 0.0, t_1, r_0, r_1, next);
-  return r_0;
+  cm_march_step(cell, cm_march_ray(p, vec3(1.0, 0.0, 0.0)), 0.0, t_1, r, next);
+  return r.x;
 }
 
 // Color of the ray's cell at t, darkened towards its edges. pixel_size: in world space.
@@ -177,14 +178,14 @@ void main() {
     float used = 0.0;
     vec3 lines = vec3(0.0);
     float clear = 1.0;
-    for (int i = 0; i < 100000 && clear > 0.02; ++i) {
-      float t_1, e_0, e_1;
-      if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+    float t_1;
+    CmBernstein e;
+    for (int i = 0; i < 100000 && clear > 0.02 && cm_walk_part(walk, t_1, e); ++i) {
       float t = walk.t;
       float span = t_1 - t;
-      float depth = 0.5 * (e_0 + e_1) * span;
+      float depth = cm_segment_mean(e) * span;
       if (view == CM_VIEW_DEPTH && used + depth >= 0.69314718) {
-        half_t = t + cm_depth_distance(e_0, e_1, span, 0.69314718 - used);
+        half_t = t + cm_depth_distance(e, span, 0.69314718 - used);
         if (half_t >= walk.t_end) half_t = 0.0;
         densest = cm_walk_densest(walk, half_t);
         break;
@@ -195,7 +196,7 @@ void main() {
         float size = max(footprint * (cm.view.orthographic != 0u ? 1.0 : t), 1e-20);
         for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
           CmFront front = walk.front[k];
-          if (front.t_0 != t || !(front.e_0 > 0.0 || front.e_1 > 0.0)) continue;
+          if (front.t_0 != t || !(cm_segment_mean(front.e) > 0.0)) continue;
           cm_stand_at(front);
           vec3 along = cm_in_volume(walk.d);
           vec3 at = cm_in_volume_point(walk.o) + t * along;

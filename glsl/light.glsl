@@ -402,7 +402,7 @@ CM_FN bool cm_is_far(CmLightSample light) {
 CM_FN float cm_nee_even_probability(CmPath p) {
   vec3 albedo = CM_MEDIUM.albedo;
 #if CM_CHANNELS && defined(CM_MARCH)
-  if (CM_MEDIUM.colored != 0u) albedo *= cm_march_color(p.start_cell);
+  if (CM_MEDIUM.colored != 0u) albedo *= cm_march_color(p.start_cell, cm_in_volume_point(p.o));
 #endif
   float absorbed = 1.0f - max(albedo.x, max(albedo.y, albedo.z));
   float left = float(cm.integrator.max_bounces) + 1.0f - float(p.bounces);

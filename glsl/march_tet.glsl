@@ -76,7 +76,7 @@ CM_FN vec4 cm_march_fit(uvec4 data, uint cell) {
   return fit;
 }
 
-CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1, CM_OUT(float) r_0, CM_OUT(float) r_1,
+CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1, CM_OUT(CmBernstein) r,
                          CM_OUT(uvec3) next) {
   uvec4 links = cm_record(cell.x, 0u);
   uvec4 data = cm_record(cell.x, 1u);
@@ -88,14 +88,14 @@ CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1,
   t_1 = max(t, t_exit);
 #if CM_LINEAR
   vec2 density = cm_fit_along(cm_march_fit(data, cell.x), frame, shape);
-  r_0 = max(0.0f, density.x + density.y * t);
-  r_1 = max(0.0f, density.x + density.y * t_1);
+  r.x = max(0.0f, density.x + density.y * t);
+  r.y = max(0.0f, density.x + density.y * t_1);
 #else
-  r_0 = cm_march_fit(data, cell.x).x;
+  r.x = cm_march_fit(data, cell.x).x;
 #if CM_MOTION
-  r_0 = max(0.0f, r_0);  // halves are rounded
+  r.x = max(0.0f, r.x);  // halves are rounded
 #endif
-  r_1 = r_0;
+  r.y = r.x;
 #endif
   uint link = cm_link_at(links, faces, t_exit);
   // Unchanged words need no select for lanes that stay in their cell.
@@ -118,12 +118,13 @@ CM_FN CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d) {
   return e;
 }
 
-CM_FN vec3 cm_march_color(uvec2 cell) { return cm_cell_color(cm_color_record(cell.x)); }
-CM_FN float cm_march_anisotropy(uvec2 cell) { return cm_cell_anisotropy(cm_anisotropy_record(cell.x), cell.x); }
+// p: the point in the cell, for grids whose values vary in a cell.
+CM_FN vec3 cm_march_color(uvec2 cell, vec3 p) { return cm_cell_color(cm_color_record(cell.x)); }
+CM_FN float cm_march_anisotropy(uvec2 cell, vec3 p) { return cm_cell_anisotropy(cm_anisotropy_record(cell.x), cell.x); }
 #endif
 
 #if CM_VELOCITY
-CM_FN vec3 cm_march_velocity(uvec2 cell) { return cm_cell_velocity(cm_velocity_record(cell.x)); }
+CM_FN vec3 cm_march_velocity(uvec2 cell, vec3 p) { return cm_cell_velocity(cm_velocity_record(cell.x)); }
 #endif
 
 #endif

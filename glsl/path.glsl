@@ -173,7 +173,7 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   if (collided) p.throughput *= CM_MEDIUM.albedo;
   if (grounded) p.throughput *= cm.ground.albedo;
 #if CM_CHANNELS && defined(CM_MARCH)  // without CM_MARCH there are no collisions
-  if (collided && CM_MEDIUM.colored != 0u) p.throughput *= cm_march_color(p.cell);
+  if (collided && CM_MEDIUM.colored != 0u) p.throughput *= cm_march_color(p.cell, cm_in_volume_point(p.o + p.t * p.d));
 #endif
   float strongest = max(p.throughput.x, max(p.throughput.y, p.throughput.z));
   // The ground as seen by the camera is large, uniform and dark. There Russian roulette would be the only noise.

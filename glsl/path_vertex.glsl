@@ -63,7 +63,7 @@ struct CmScatterSample {
 // Mean cosine of the medium at the path's collision.
 CM_FN float cm_anisotropy(CmPath p) {
 #if CM_CHANNELS && defined(CM_MARCH)
-  if (CM_MEDIUM.anisotropic != 0u && p.start == CM_IN_MEDIUM) return cm_march_anisotropy(p.start_cell);
+  if (CM_MEDIUM.anisotropic != 0u && p.start == CM_IN_MEDIUM) return cm_march_anisotropy(p.start_cell, cm_in_volume_point(p.o));
 #endif
   return CM_MEDIUM.anisotropy;
 }

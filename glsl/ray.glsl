@@ -1,4 +1,4 @@
-// Camera rays, the bounds of all density, and optical depths within a cell. Shared by GLSL and C++; the includer has
+// Camera rays and the bounds of all density. Shared by GLSL and C++; the includer has
 //   cm   the parameters (glsl/parameters.glsl)
 #ifndef CM_RAY_GLSL
 #define CM_RAY_GLSL
@@ -98,20 +98,6 @@ CM_FN float cm_lens_ray(uvec2 pixel, vec2 within, vec2 lens, CM_OUT(vec3) o, CM_
 // Ray through the center of the lens.
 CM_FN float cm_camera_ray(uvec2 pixel, vec2 within, CM_OUT(vec3) o, CM_OUT(vec3) w) {
   return cm_lens_ray(pixel, within, vec2(0.0f, 0.0f), o, w);
-}
-
-// Optical depth of the first `way` of a ray's segment in a cell. span: the segment's length; e_0, e_1: extinctions at
-// its ends.
-CM_FN float cm_depth_of(float e_0, float e_1, float span, float way) {
-  float part = clamp(way / max(span, 1e-30f), 0.0f, 1.0f);
-  return (e_0 + 0.5f * (e_1 - e_0) * part) * part * span;
-}
-
-// Distance into a ray's segment in a cell at which this optical depth is used up. span: the segment's length; e_0, e_1:
-// extinctions at its ends. Solves e_0 s + (e_1 - e_0) s^2 / (2 span) = depth in the form without cancellation.
-CM_FN float cm_depth_distance(float e_0, float e_1, float span, float depth) {
-  float root = sqrt(max(0.0f, e_0 * e_0 + 2.0f * (e_1 - e_0) / span * depth));
-  return min(span, 2.0f * depth / (e_0 + root));
 }
 
 #endif

@@ -37,16 +37,17 @@ void main() {
   // Volumes hidden from cameras still cast shadows.
   CmWalk walk = cm_walk(o, cm_to_cube(w), cm_range.y, false);
   for (int i = 0; i < 100000 && slice < slices; ++i) {
-    float t_1, e_0, e_1;
-    if (!cm_walk_part(walk, t_1, e_0, e_1)) break;
+    float t_1;
+    CmBernstein e;
+    if (!cm_walk_part(walk, t_1, e)) break;
     float span = t_1 - walk.t;
     for (; slice < slices; ++slice) {
       float t = cm_range.x + step_t * float(slice);
       if (t >= t_1) break;
-      float here = used + cm_depth_of(e_0, e_1, span, t - walk.t);
+      float here = used + cm_depth_of(e, span, t - walk.t);
       imageStore(cm_map, ivec3(texel, slice), vec4(exp(-here)));
     }
-    used += 0.5 * (e_0 + e_1) * span;
+    used += cm_segment_mean(e) * span;
     cm_walk_on(walk, t_1);
   }
   for (; slice < slices; ++slice) imageStore(cm_map, ivec3(texel, slice), vec4(exp(-used)));

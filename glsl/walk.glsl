@@ -1,5 +1,5 @@
 // Deterministic traversal of a ray through the volume, or through all volumes together, segment by segment. Extinction
-// is linear in each segment. Used for feature rays and transmittance; paths traverse volumes one by one
+// is a polynomial in each segment (segment.glsl). Used for feature rays and transmittance; paths traverse volumes one by one
 // (free_flight.glsl).
 // The includer has march.glsl and ray.glsl before this.
 #ifndef CM_WALK_GLSL
@@ -14,14 +14,13 @@
 #define CM_IS_FRONT(k, walk) (k < 1 && k < walk.count)  // without a loop
 #endif
 
-// An active volume of the ray: its current cell, which spans t_0 to t_1, with the extinctions there.
+// An active volume of the ray: its current cell, which spans t_0 to t_1, with the extinction along it.
 struct CmFront {
   uvec3 cell;
   uvec3 next;
   float t_0;
   float t_1;
-  float e_0;
-  float e_1;
+  CmBernstein e;
   uint volume;
 };
 
@@ -49,16 +48,29 @@ void cm_front_step(vec3 o, vec3 d, float t, inout CmFront front) {
   CmMarchRay ray = cm_march_ray(cm_in_volume_point(o), cm_in_volume(d));
   front.cell = front.next;
   front.t_0 = t;
-  float r_0;
-  float r_1;
-  cm_march_step(front.cell, ray, t, front.t_1, r_0, r_1, front.next);
-  front.e_0 = CM_MEDIUM.extinction * r_0;
-  front.e_1 = CM_MEDIUM.extinction * r_1;
+  CmBernstein r;
+  cm_march_step(front.cell, ray, t, front.t_1, r, front.next);
+  front.e = CM_MEDIUM.extinction * r;
 }
 
 float cm_front_extinction(CmFront front, float t) {
-  if (t >= front.t_1) return front.e_1;
-  return front.e_0 + (front.e_1 - front.e_0) * ((t - front.t_0) / (front.t_1 - front.t_0));
+  if (t >= front.t_1) return cm_segment_end(front.e);
+  return cm_segment_at(front.e, (t - front.t_0) / (front.t_1 - front.t_0));
+}
+
+// Position of t in the front's cell, from 0 to 1.
+float cm_front_position(CmFront front, float t) {
+  return t >= front.t_1 ? 1.0 : (t - front.t_0) / (front.t_1 - front.t_0);
+}
+
+// The extinction from t to t_1.
+CmBernstein cm_front_part(CmFront front, float t, float t_1) {
+#if CM_CUBIC
+  if (t == front.t_0 && t_1 >= front.t_1) return front.e;
+  return cm_segment_part(front.e, cm_front_position(front, t), cm_front_position(front, t_1));
+#else
+  return vec2(t == front.t_0 ? front.e.x : cm_front_extinction(front, t), cm_front_extinction(front, t_1));
+#endif
 }
 
 // Finds the next volume.
@@ -92,12 +104,11 @@ CmWalk cm_walk(vec3 o, vec3 d, float t_end, bool of_camera) {
   return walk;
 }
 
-// The segment from walk.t on. t_1: its end, which may be beyond t_end; e_0, e_1: extinctions at both ends. Returns
-// false if there is none.
-bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1) {
+// The segment from walk.t on. t_1: its end, which may be beyond t_end; e: extinction along it. Returns false if there is
+// none.
+bool cm_walk_part(inout CmWalk walk, out float t_1, out CmBernstein e) {
   t_1 = 3.0e38;
-  e_0 = 0.0;
-  e_1 = 0.0;
+  e = CmBernstein(0.0);
   while (walk.count < CM_MAX_FRONTS && walk.entry < 3.0e38 && (walk.count == 0 || walk.entry <= walk.t)) {
     walk.t = max(walk.t, walk.entry);
     CmFront front;
@@ -112,10 +123,7 @@ bool cm_walk_part(inout CmWalk walk, out float t_1, out float e_0, out float e_1
   if (walk.count == 0 || walk.t >= walk.t_end) return false;
   if (walk.count < CM_MAX_FRONTS) t_1 = walk.entry;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) t_1 = min(t_1, walk.front[k].t_1);
-  for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
-    e_0 += walk.t == walk.front[k].t_0 ? walk.front[k].e_0 : cm_front_extinction(walk.front[k], walk.t);
-    e_1 += cm_front_extinction(walk.front[k], t_1);
-  }
+  for (int k = 0; CM_IS_FRONT(k, walk); ++k) e += cm_front_part(walk.front[k], walk.t, t_1);
   return true;
 }
 
@@ -171,7 +179,7 @@ vec3 cm_walk_source(inout CmWalk walk) {
   float sum = 0.0;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     cm_stand_at(walk.front[k]);
-    float extinction = walk.front[k].e_0 + walk.front[k].e_1;
+    float extinction = cm_segment_mean(walk.front[k].e);
     if (CM_MEDIUM.holdout == 0u) source += extinction * CM_MEDIUM.source;
     sum += extinction;
   }
@@ -181,18 +189,23 @@ vec3 cm_walk_source(inout CmWalk walk) {
 #endif
 }
 
+// The middle of a front's segment, in the cube space of its volume, where the ray stands.
+vec3 cm_front_middle(vec3 o, vec3 d, CmFront front) {
+  return cm_in_volume_point(o) + 0.5 * (front.t_0 + front.t_1) * cm_in_volume(d);
+}
+
 // Albedo and mean scattering cosine of the active media, weighted by extinction.
 vec4 cm_walk_scatters(inout CmWalk walk) {
   vec4 scatters = vec4(0.0);
   float sum = 0.0;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
     cm_stand_at(walk.front[k]);
-    float extinction = walk.front[k].e_0 + walk.front[k].e_1;
+    float extinction = cm_segment_mean(walk.front[k].e);
     vec3 albedo = CM_MEDIUM.holdout != 0u ? vec3(0.0) : CM_MEDIUM.albedo;
     vec4 here = vec4(albedo, mix(CM_MEDIUM.anisotropy, CM_MEDIUM.second_anisotropy, CM_MEDIUM.second_weight));
 #if CM_CHANNELS
-    if (CM_MEDIUM.colored != 0u) here.rgb *= cm_march_color(walk.front[k].cell.xy);
-    if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy);
+    if (CM_MEDIUM.colored != 0u) here.rgb *= cm_march_color(walk.front[k].cell.xy, cm_front_middle(walk.o, walk.d, walk.front[k]));
+    if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy, cm_front_middle(walk.o, walk.d, walk.front[k]));
 #endif
     scatters += extinction * here;
     sum += extinction;
@@ -210,7 +223,7 @@ vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
     cm_stand_at(front);
     float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
     if (extinction > 0.0 && CM_GRID.moves != 0u)
-      velocity += extinction * cm_out_of_volume(cm_march_velocity(front.cell.xy));
+      velocity += extinction * cm_out_of_volume(cm_march_velocity(front.cell.xy, cm_front_middle(walk.o, walk.d, front)));
     sum += extinction;
   }
   return sum > 0.0 ? velocity / sum : vec3(0.0);

@@ -45,6 +45,10 @@ const char* name_of(const Choices& choices, Value value) {
 
 const char* grid_type_name(cumulet_grid_type type) { return name_of(settings::grid_type_choices, type); }
 
+const char* interpolation_name(cumulet_interpolation interpolation) {
+  return name_of(settings::voxel_interpolation_choices, interpolation);
+}
+
 std::vector<image::Attribute> camera_metadata(const double view[16], const double projection[16]) {
   Matrix eye{};
   std::copy_n(view, 16, eye.begin());

@@ -22,5 +22,7 @@ namespace cumulet::demo {
 
 /// Returns the name of the grid type in flags and scene files.
 [[nodiscard]] const char* grid_type_name(cumulet_grid_type type);
+/// Returns the name of an interpolation between voxels, as in flags.
+[[nodiscard]] const char* interpolation_name(cumulet_interpolation interpolation);
 
 }  // namespace cumulet::demo

@@ -56,6 +56,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
   json["backend"] = backend;
   json["grid_type"] = grid_type_name(options.scene.grid.type);
+  json["interpolation"] = interpolation_name(options.scene.grid.interpolation);
   if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
   // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <limits>
 #include <utility>
 
 #include "assets/patient_lock.hpp"
@@ -14,19 +13,6 @@
 namespace cumulet::viewer {
 
 namespace {
-
-// Inclusive bounds in voxels.
-struct Box {
-  glm::ivec3 low{std::numeric_limits<int>::max()};
-  glm::ivec3 high{std::numeric_limits<int>::min()};
-
-  void add(const volume::ScalarVolume& field) {
-    if (field.empty()) return;
-    low = glm::min(low, field.bounds_min);
-    high = glm::max(high, field.bounds_max);
-  }
-  [[nodiscard]] bool empty() const { return low.x > high.x; }
-};
 
 // True if the frame's voxels are in main memory and have channels that are averaged with the density as weight.
 bool is_weighted(const volume::VolumeFrame& frame, bool in_gl) {
@@ -66,6 +52,25 @@ VolumeAsset::VolumeAsset(scene::StateInGlPtr in_gl, const Progress* progress, st
   begin(progress);
 }
 
+VolumeAsset::VolumeAsset(const VolumeAsset& nearest, Interpolated /*tag*/)
+    : frame_(nearest.frame_),
+      close_(nearest.close_),
+      volume_info_(nearest.volume_info_),
+      box_(nearest.box_),
+      cube_(grid::fit_cube(frame_->density, box_.low, box_.high, grid::Interpolation::linear)) {}
+
+std::shared_ptr<const VolumeAsset> VolumeAsset::interpolated() const {
+  const std::scoped_lock lock(mutex_);
+  if (!interpolated_) interpolated_ = std::make_shared<const VolumeAsset>(*this, Interpolated{});
+  return interpolated_;
+}
+
+void VolumeAsset::Box::add(const volume::ScalarVolume& field) {
+  if (field.empty()) return;
+  low = glm::min(low, field.bounds_min);
+  high = glm::max(high, field.bounds_max);
+}
+
 double VolumeAsset::temperature_scale() const {
   if (frame_->temperature_scale) return *frame_->temperature_scale;
   float max_value = 0.0F;
@@ -98,6 +103,7 @@ void VolumeAsset::begin(const Progress* progress) {
   if (shown.empty()) shown = all;
   const bool empty = all.empty();
   if (empty) shown = all = {density.bounds_min, density.bounds_max};
+  box_ = all;
   cube_ = grid::fit_cube(density, all.low, all.high);
   VolumeInfo volume_info{.empty = empty,
                          .may_emit = is_there(frame_->flame) || is_there(frame_->temperature),
@@ -116,8 +122,14 @@ std::uint64_t VolumeAsset::bytes() const {
     bytes += frame->density.bytes();
     for (const volume::ScalarVolume* field : frame->beside_density()) bytes += field->bytes();
   }
+  return bytes + derived_bytes();
+}
+
+std::uint64_t VolumeAsset::derived_bytes() const {
+  std::uint64_t bytes = 0;
   const std::scoped_lock lock(mutex_);
   if (exposed_) bytes += exposed_->asset->bytes();
+  if (interpolated_) bytes += interpolated_->derived_bytes();
   if (statistics_) bytes += statistics_->bytes();
   if (ramped_) bytes += ramped_->density.voxels->bytes() + ramped_->density.statistics->bytes();
   if (latticed_) bytes += latticed_->lattice->bytes();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -40,6 +41,8 @@ using VolumeInfoPtr = std::shared_ptr<const VolumeInfo>;
 
 /// A volume and data derived from it, shared by all viewers that show it. Immutable for its users; thread-safe.
 class VolumeAsset {
+  struct Interpolated {};
+
  public:
   /// Throws Error(unsupported) if the volume does not fit into a control cube.
   explicit VolumeAsset(volume::VolumeFrame frame, const Progress* progress = nullptr);
@@ -51,6 +54,8 @@ class VolumeAsset {
                        std::optional<double> temperature_scale = {});
   explicit VolumeAsset(volume::ScalarVolume density, const Progress* progress = nullptr)
       : VolumeAsset(volume::VolumeFrame{.density = std::move(density)}, progress) {}
+  /// See interpolated().
+  VolumeAsset(const VolumeAsset& nearest, Interpolated tag);
 
   /// The density field.
   [[nodiscard]] const volume::ScalarVolume& volume() const { return frame_->density; }
@@ -77,6 +82,9 @@ class VolumeAsset {
     return volume_info_->bounds(transform);
   }
   [[nodiscard]] const volume::CoarseVolume& coarse() const { return volume_info_->coarse; }
+  /// Returns the volume with linear interpolation between its voxels: it shares them and has its own derived data. It
+  /// is made once. The voxels must be in main memory. Throws Error(unsupported) if it does not fit into a control cube.
+  [[nodiscard]] std::shared_ptr<const VolumeAsset> interpolated() const;
   /// Main memory in bytes, including data derived so far.
   [[nodiscard]] std::uint64_t bytes() const;
   /// Density for grid builds. The statistics are valid while `voxels` is held. Channels weighted by density have the
@@ -108,6 +116,7 @@ class VolumeAsset {
 
  private:
   void begin(const Progress* progress);
+  [[nodiscard]] std::uint64_t derived_bytes() const;
   // Temperature scale after the ramp has been applied.
   [[nodiscard]] double scale_of(const volume::Ramp& temperature_ramp) const;
   using Frames = std::vector<std::shared_ptr<const volume::VolumeFrame>>;
@@ -137,6 +146,15 @@ class VolumeAsset {
   std::shared_ptr<const volume::VolumeFrame> frame_;
   std::shared_ptr<const volume::VolumeFrame> close_;  // null: no shutter interval
   VolumeInfoPtr volume_info_;
+  // Inclusive bounds of the voxels of all fields that are shown.
+  struct Box {
+    glm::ivec3 low{std::numeric_limits<int>::max()};
+    glm::ivec3 high{std::numeric_limits<int>::min()};
+
+    void add(const volume::ScalarVolume& field);
+    [[nodiscard]] bool empty() const { return low.x > high.x; }
+  };
+  Box box_;
   grid::Cube cube_;
   // Results are computed under the first mutex, one at a time, and stored under the second one too, so that bytes()
   // does not wait for a computation.
@@ -176,6 +194,7 @@ class VolumeAsset {
     std::optional<decltype(grid::Channels::forward)> forward;
   };
   mutable std::optional<Weighted> weighted_;  // by density
+  mutable std::shared_ptr<const VolumeAsset> interpolated_;
 };
 
 using VolumeAssetPtr = std::shared_ptr<const VolumeAsset>;

@@ -195,9 +195,8 @@ void Evaluation::brick(const Statistics::Node& node, unsigned levels, BrickSums&
   const auto signs = static_cast<unsigned>(odd.x + 2 * odd.y + 4 * odd.z);
   const float* blocks = transmittance_ != nullptr ? transmittance_->blocks(node.corner) : nullptr;
   const float most = blocks != nullptr ? *std::max_element(blocks, blocks + Transmittance::blocks_per_brick) : 1.0F;
-  const float* values = nullptr;
-  float reference = 0.0F;
-  volume::BrickValues::Brick room;
+  BrickField field;
+  bool is_read = false;
   for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
     const Moments& whole = statistics_->kuhn(node, permutation);
     if (whole.min >= whole.max) continue;
@@ -208,11 +207,9 @@ void Evaluation::brick(const Statistics::Node& node, unsigned levels, BrickSums&
     while (end < last && measure_.bound(whole.min, whole.max, longest_[std::bit_width(end) - 1], most) > floor)
       end *= 2;
     if (end == 1) continue;
-    if (values == nullptr) {
-      values = statistics_->values(node, room);
-      reference = BrickSums::reference_of(values);
-    }
-    sums.compute(values, reference, tree);
+    if (!is_read) field.read(*statistics_, node);
+    is_read = true;
+    field.sum(tree, sums);
     if (blocks != nullptr) lit.compute(blocks, tree);
     for (unsigned h = 1; h < end; ++h) {
       if (sums.min[h] >= sums.max[h]) continue;

@@ -249,11 +249,11 @@ class GridBuilder::LeafMoments {
     const Statistics::Node& holder = statistics_->node_at(ivec3(centroid));
     if (holder.is_uniform()) return uniform_moments(v0, node.shape, holder.uniform);
     if (&holder != brick_ || node.permutation != permutation_) {
+      if (&holder != brick_) field_.read(*statistics_, holder);
       brick_ = &holder;
       permutation_ = node.permutation;
       tree_ = &brick_tree(kuhn_frame(holder.corner, volume::brick_size, node.permutation));
-      const float* values = statistics_->values(holder, room_);
-      sums_->compute(values, BrickSums::reference_of(values), *tree_);
+      field_.sum(*tree_, *sums_);
     }
     return sums_->moments(node.heap, holder.corner, *tree_);
   }
@@ -261,7 +261,7 @@ class GridBuilder::LeafMoments {
  private:
   const Statistics* statistics_;
   std::unique_ptr<BrickSums> sums_ = std::make_unique<BrickSums>();
-  volume::BrickValues::Brick room_{};
+  BrickField field_;
   const Statistics::Node* brick_ = nullptr;  // brick of sums_
   unsigned permutation_ = 0;
   const BrickTree* tree_ = nullptr;

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <bit>
@@ -63,12 +64,30 @@ std::uint32_t frame_from(const std::array<bool, 3>& cube_axis_negative, std::uin
   return frame;
 }
 
+int corner_index(const ivec3& point) { return (point.x * brick_corners + point.y) * brick_corners + point.z; }
+
+BrickTree::Leaf leaf_of(const vec3& v0, std::uint32_t shape) {
+  BrickTree::Leaf leaf{};
+  leaf.first = static_cast<std::uint16_t>(corner_index(ivec3(v0)));
+  for (int i = 0; i < 3; ++i) {
+    vec3 along(0.0F);
+    along[i] = 1.0F;
+    const ivec3 step(core::cm_from_frame(along, shape));
+    const int axis = step.x != 0 ? 0 : (step.y != 0 ? 1 : 2);
+    const auto at = static_cast<std::size_t>(i);
+    leaf.step[at] = static_cast<std::int16_t>(corner_index(step));
+    leaf.axis[at] = static_cast<std::int8_t>(step[axis] > 0 ? axis : ~axis);
+  }
+  return leaf;
+}
+
 void fill_tree(BrickTree& tree, unsigned heap, const vec3& v0, std::uint32_t shape) {
   const vec3 centroid = cell_centroid(v0, shape);
   if (heap >= 512) {
     const ivec3 voxel(centroid);
     tree.voxel[heap - 512] = static_cast<std::uint16_t>((voxel.x * 8 + voxel.y) * 8 + voxel.z);
     for (int axis = 0; axis < 3; ++axis) tree.centroid[static_cast<std::size_t>(axis)][heap - 512] = centroid[axis];
+    tree.leaf[heap - 512] = leaf_of(v0, shape);
     return;
   }
   tree.shape[heap] = static_cast<std::uint16_t>(shape);
@@ -169,6 +188,10 @@ void BrickSums::compute(const float* values, float of_brick, const BrickTree& tr
   for (unsigned i = 0; i < 512; ++i) x[512 + i] = mass[512 + i] * tree.centroid[0][i];
   for (unsigned i = 0; i < 512; ++i) y[512 + i] = mass[512 + i] * tree.centroid[1][i];
   for (unsigned i = 0; i < 512; ++i) z[512 + i] = mass[512 + i] * tree.centroid[2][i];
+  add_up();
+}
+
+void BrickSums::add_up() {
   for (unsigned level = 256; level >= 1; level /= 2) {
     const auto add = [level](std::array<float, 1024>& a) {
       for (unsigned h = level; h < 2 * level; ++h) a[h] = a[2 * h] + a[2 * h + 1];
@@ -180,6 +203,25 @@ void BrickSums::compute(const float* values, float of_brick, const BrickTree& tr
     add(z);
     for (unsigned h = level; h < 2 * level; ++h) min[h] = std::min(min[2 * h], min[2 * h + 1]);
     for (unsigned h = level; h < 2 * level; ++h) max[h] = std::max(max[2 * h], max[2 * h + 1]);
+  }
+}
+
+void BrickField::read(const Statistics& statistics, const Statistics::Node& node) {
+  interpolates_ = statistics.interpolates();
+  if (interpolates_) {
+    statistics.read_corners(node, corners_);
+    reference_ = std::accumulate(corners_.begin(), corners_.end(), 0.0F) / static_cast<float>(corners_.size());
+  } else {
+    values_ = statistics.values(node, room_);
+    reference_ = BrickSums::reference_of(values_);
+  }
+}
+
+void BrickField::sum(const BrickTree& tree, BrickSums& sums) const {
+  if (interpolates_) {
+    sums.compute_between(corners_, reference_, tree);
+  } else {
+    sums.compute(values_, reference_, tree);
   }
 }
 
@@ -233,7 +275,7 @@ Moments uniform_moments(const vec3& v0, std::uint32_t shape, float value) {
 Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube, Progress* progress)
     : cube_(cube),
       by_size_(static_cast<std::size_t>(cube.log2_size) + 1),
-      brick_values_(&volume.brick_values),
+      volume_(&volume),
       on_device_(volume.on_device) {
   build_topology(volume, progress);
   compute_mean_optical_depth(volume, progress);
@@ -241,14 +283,73 @@ Statistics::Statistics(const volume::ScalarVolume& volume, const Cube& cube, Pro
 }
 
 const float* Statistics::values(const Node& node, volume::BrickValues::Brick& room) const {
-  const auto count = static_cast<std::int32_t>(brick_values_->size() / volume::brick_voxels);
-  return node.values < count ? brick_values_->brick(std::size_t(node.values), room)
+  if (interpolates()) {
+    BrickCorners corners;
+    read_corners(node, corners);
+    for (int v = 0; v < volume::brick_voxels; ++v) {
+      float sum = 0.0F;
+      for (int i = 0; i < 8; ++i)
+        sum += corners[static_cast<std::size_t>(
+            corner_index({v / 64 + (i >> 2), v / 8 % 8 + ((i >> 1) & 1), v % 8 + (i & 1)}))];
+      room[static_cast<std::size_t>(v)] = 0.125F * sum;
+    }
+    return room.data();
+  }
+  const auto count = static_cast<std::int32_t>(volume_->brick_values.size() / volume::brick_voxels);
+  return node.values < count ? volume_->brick_values.brick(std::size_t(node.values), room)
                              : extra_values_.data() + std::size_t(node.values - count) * volume::brick_voxels;
+}
+
+namespace {
+
+// Copies the voxels of a brick that are lattice points of a brick with interpolation. offset: of the first brick, in
+// bricks from the second one, 0 or 1 along each axis. values: null for 0.
+void copy_corners(const ivec3& offset, const float* values, BrickCorners& corners) {
+  const ivec3 from = offset * volume::brick_size;
+  const ivec3 to = glm::mix(ivec3(volume::brick_size), ivec3(brick_corners), glm::equal(offset, ivec3(1)));
+  for (int i = from.x; i < to.x; ++i) {
+    for (int j = from.y; j < to.y; ++j) {
+      for (int k = from.z; k < to.z; ++k)
+        corners[static_cast<std::size_t>(corner_index({i, j, k}))] =
+            values == nullptr ? 0.0F : values[((i & 7) * 8 + (j & 7)) * 8 + (k & 7)];
+    }
+  }
+}
+
+// Reads a brick's corners. tiles: null if neither tiles nor the background have other voxels than 0.
+void gather_corners(const volume::ScalarVolume& volume, const ivec3& low, const std::vector<std::uint32_t>* tiles,
+                    BrickCorners& corners) {
+  volume::BrickValues::Brick room;
+  for (int i = 0; i < 8; ++i) {
+    const ivec3 offset(i >> 2, (i >> 1) & 1, i & 1);
+    const ivec3 origin = low + offset * volume::brick_size;
+    const float* values = volume::find_brick(volume, origin, room);
+    if (values == nullptr && tiles != nullptr) {
+      volume::fill_brick(volume, origin, *tiles, room.data());
+      values = room.data();
+    }
+    copy_corners(offset, values, corners);
+  }
+}
+
+bool are_equal(const BrickCorners& corners) {
+  return std::ranges::all_of(corners, [&](float value) { return value == corners[0]; });
+}
+
+}  // namespace
+
+void Statistics::read_corners(const Node& node, BrickCorners& corners) const {
+  if (node.values == 0) {
+    gather_corners(*volume_, node.corner + cube_.origin, nullptr, corners);
+  } else {
+    std::copy_n(extra_values_.begin() + std::ptrdiff_t{node.values - 1} * std::ssize(corners), corners.size(),
+                corners.begin());
+  }
 }
 
 bool Statistics::values_are_halves() const {
   if (on_device_) return on_device_->are_halves();
-  return brick_values_->are_halves() &&
+  return volume_->brick_values.are_halves() &&
          std::ranges::all_of(extra_values_, [](float value) { return volume::exact_half(value).has_value(); });
 }
 
@@ -277,14 +378,27 @@ std::optional<float> one_value(const volume::ScalarVolume& volume, const VoxelBo
   return std::nullopt;
 }
 
+// Returns the origins of the bricks that may have values beside tiles and the background. With interpolation these
+// include the bricks whose far lattice points are in a brick of the volume.
+std::vector<ivec3> occupied_bricks(const volume::ScalarVolume& volume, bool interpolates) {
+  if (!interpolates) return volume.brick_origins;
+  std::vector<ivec3> origins;
+  origins.reserve(8 * volume.brick_origins.size());
+  for (const ivec3& origin : volume.brick_origins) {
+    for (int i = 0; i < 8; ++i) origins.push_back(origin - volume::brick_size * ivec3(i >> 2, (i >> 1) & 1, i & 1));
+  }
+  tbb::parallel_sort(origins, volume::lexicographic);
+  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  return origins;
+}
+
 // Sorts bricks [first, last) by octant about the middle; octant i (x fastest) is then [ends[i], ends[i + 1]).
-std::array<std::uint32_t, 9> sort_by_octant(const volume::ScalarVolume& volume, std::vector<std::uint32_t>& bricks,
+std::array<std::uint32_t, 9> sort_by_octant(const std::vector<ivec3>& origins, std::vector<std::uint32_t>& bricks,
                                             std::uint32_t first, std::uint32_t last, const ivec3& middle) {
   const auto split = [&](std::uint32_t from, std::uint32_t to, int axis) {
-    return static_cast<std::uint32_t>(
-        std::partition(bricks.begin() + from, bricks.begin() + to,
-                       [&](std::uint32_t b) { return volume.brick_origins[b][axis] < middle[axis]; }) -
-        bricks.begin());
+    return static_cast<std::uint32_t>(std::partition(bricks.begin() + from, bricks.begin() + to,
+                                                     [&](std::uint32_t b) { return origins[b][axis] < middle[axis]; }) -
+                                      bricks.begin());
   };
   std::array<std::uint32_t, 9> ends{};
   ends[0] = first;
@@ -297,16 +411,45 @@ std::array<std::uint32_t, 9> sort_by_octant(const volume::ScalarVolume& volume, 
 
 }  // namespace
 
+void Statistics::set_values(Node& node, const std::optional<std::uint32_t>& brick,
+                            const std::vector<std::uint32_t>& tiles) {
+  if (brick) {
+    node.values = static_cast<std::int32_t>(*brick);
+    return;
+  }
+  // A tile or the background ends inside this brick.
+  node.values = static_cast<std::int32_t>(volume_->brick_origins.size() + extra_values_.size() / volume::brick_voxels);
+  extra_values_.resize(extra_values_.size() + volume::brick_voxels);
+  volume::fill_brick(*volume_, node.corner + cube_.origin, tiles,
+                     &extra_values_[extra_values_.size() - volume::brick_voxels]);
+}
+
+void Statistics::set_corners(Node& node, const std::vector<std::uint32_t>& tiles) {
+  const bool only_bricks = tiles.empty() && volume_->background == 0.0F;
+  BrickCorners corners;
+  gather_corners(*volume_, node.corner + cube_.origin, only_bricks ? nullptr : &tiles, corners);
+  if (are_equal(corners)) {
+    node.uniform = corners[0];
+    return;
+  }
+  // The corners of payload 0 are gathered again when they are read.
+  node.values = 0;
+  if (only_bricks) return;
+  extra_values_.insert(extra_values_.end(), corners.begin(), corners.end());
+  node.values = static_cast<std::int32_t>(extra_values_.size() / corners.size());
+}
+
 void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* progress) {
-  ProgressPart part(progress, 0.0, 0.1, volume.brick_origins.size());
+  const std::vector<ivec3> origins = occupied_bricks(volume, interpolates());
+  const int reach = interpolates() ? 1 : 0;  // lattice points beyond the cells of a node
+  ProgressPart part(progress, 0.0, 0.1, origins.size());
   struct Work {
     std::uint32_t node;
     std::uint32_t first, last;         // range of bricks
     std::vector<std::uint32_t> tiles;  // tiles that overlap the node
   };
-  std::vector<std::uint32_t> bricks(volume.brick_origins.size());
+  std::vector<std::uint32_t> bricks(origins.size());
   for (std::uint32_t i = 0; i < bricks.size(); ++i) bricks[i] = i;
-  const auto file_bricks = static_cast<std::int32_t>(bricks.size());
 
   std::vector<std::uint32_t> all_tiles(volume.tiles.size());
   for (std::uint32_t i = 0; i < all_tiles.size(); ++i) all_tiles[i] = i;
@@ -323,7 +466,7 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
     const ivec3 corner = nodes_[work.node].corner;
     const int log2_size = nodes_[work.node].log2_size;
     const ivec3 low = corner + cube_.origin;
-    const VoxelBox box{low, low + ((1 << log2_size) - 1)};
+    const VoxelBox box{low, low + ((1 << log2_size) - 1 + reach)};
     if (!box.overlaps({volume.bounds_min, volume.bounds_max})) continue;  // uniform zero
     std::erase_if(work.tiles, [&](std::uint32_t t) { return !box.overlaps(box_of(volume.tiles[t])); });
     const bool no_bricks = work.first == work.last;
@@ -332,23 +475,20 @@ void Statistics::build_topology(const volume::ScalarVolume& volume, Progress* pr
       node.uniform = *value;
       continue;
     }
-    by_size_[static_cast<std::size_t>(log2_size)].push_back(work.node);
-    if (log2_size == 3 && !no_bricks) {
-      node.values = static_cast<std::int32_t>(bricks[work.first]);
-      ++done;
-      continue;
+    if (log2_size == 3 && interpolates()) {
+      set_corners(node, work.tiles);
+    } else if (log2_size == 3) {
+      set_values(node, no_bricks ? std::nullopt : std::optional(bricks[work.first]), work.tiles);
     }
+    if (log2_size > 3 || !node.is_uniform()) by_size_[static_cast<std::size_t>(log2_size)].push_back(work.node);
     if (log2_size == 3) {
-      node.values = file_bricks + static_cast<std::int32_t>(extra_values_.size() / volume::brick_voxels);
-      // A tile or the background ends inside this brick.
-      extra_values_.resize(extra_values_.size() + volume::brick_voxels);
-      volume::fill_brick(volume, low, work.tiles, &extra_values_[extra_values_.size() - volume::brick_voxels]);
+      done += no_bricks ? 0 : 1;
       continue;
     }
     const auto child = static_cast<std::uint32_t>(nodes_.size());
     node.child = child;
     const int half = 1 << (log2_size - 1);
-    const auto ends = sort_by_octant(volume, bricks, work.first, work.last, low + half);
+    const auto ends = sort_by_octant(origins, bricks, work.first, work.last, low + half);
     for (unsigned i = 0; i < 8; ++i) {
       nodes_.push_back(
           {.corner = corner + half * ivec3(i & 1U, (i >> 1U) & 1U, (i >> 2U) & 1U), .log2_size = log2_size - 1});
@@ -396,7 +536,7 @@ void Statistics::compute_moments(Progress* progress) {
   part.resize(moments_, count);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bricks.size(), 16), [&](const auto& range) {
     const auto sums = std::make_unique<BrickSums>();
-    volume::BrickValues::Brick room;
+    BrickField field;
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Node& node = nodes_[bricks[i]];
       if (const volume::BrickSummary* known = summary(node)) {
@@ -406,11 +546,10 @@ void Statistics::compute_moments(Progress* progress) {
         }
         continue;
       }
-      const float* brick = values(node, room);
-      const float reference = BrickSums::reference_of(brick);
+      field.read(*this, node);
       for (std::uint32_t permutation = 0; permutation < 6; ++permutation) {
         const BrickTree& tree = brick_tree(kuhn_frame(node.corner, 8, permutation));
-        sums->compute(brick, reference, tree);
+        field.sum(tree, *sums);
         moments_[node.moments + permutation] = sums->moments(1, node.corner, tree);
       }
     }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 #include "base/progress.hpp"
@@ -11,13 +12,13 @@
 
 namespace cumulet::grid {
 
-/// Exact integrals of the voxel field f over a region, in cube space (unit: voxel).
+/// Exact integrals of the field f over a region, in cube space (unit: voxel).
 struct Moments {
   double volume = 0.0;
   double mass = 0.0;      ///< integral of f
   double square = 0.0;    ///< integral of f^2
   glm::dvec3 first{0.0};  ///< integral of f x, about the cube's origin
-  float min = 3.0e38F;    ///< over all voxels that the region covers
+  float min = 3.0e38F;    ///< over all voxels that the region covers, or between which it interpolates
   float max = -3.0e38F;
 
   Moments& operator+=(const Moments& other);
@@ -49,6 +50,14 @@ struct BrickTree {
   std::array<glm::u8vec3, 512> midpoint;           ///< midpoint of the refinement edge of node h, from the brick's low
                                                    ///< corner
   std::array<glm::vec3, 512> node_centroid;        ///< centroid of internal node h, from the brick's low corner
+
+  /// The axes of a leaf's frame in the 9^3 lattice points of a brick, for interpolation.
+  struct Leaf {
+    std::uint16_t first;               ///< index of its vertex 0
+    std::array<std::int16_t, 3> step;  ///< of the index, along each axis of its frame
+    std::array<std::int8_t, 3> axis;   ///< axis of the cube; negative direction: ~axis
+  };
+  std::array<Leaf, 512> leaf;
 };
 const BrickTree& brick_tree(std::uint32_t frame);
 
@@ -56,6 +65,10 @@ const BrickTree& brick_tree(std::uint32_t frame);
 std::uint32_t permutation_of(std::uint32_t shape);
 /// The frame (bits 0-8 of a shape word) of the Kuhn tetrahedron with this permutation in the octree cube at corner.
 std::uint32_t kuhn_frame(const glm::ivec3& corner, int size, std::uint32_t permutation);
+
+/// Values at the 9^3 lattice points of a brick, z fastest.
+inline constexpr int brick_corners = volume::brick_size + 1;
+using BrickCorners = std::array<float, std::size_t{brick_corners} * brick_corners * brick_corners>;
 
 /// Sums over the heap of one brick tetrahedron, relative to a reference value to avoid float cancellation.
 struct BrickSums {
@@ -69,8 +82,13 @@ struct BrickSums {
   /// compute().
   static float reference_of(const float* values);
   void compute(const float* values, float of_brick, const BrickTree& tree);
+  /// Computes the sums of the trilinear function between the 9^3 values at a brick's lattice points.
+  void compute_between(const BrickCorners& corners, float of_brick, const BrickTree& tree);
   /// Returns the moments of heap node h of a brick whose low corner is at corner.
   [[nodiscard]] Moments moments(unsigned h, const glm::ivec3& corner, const BrickTree& tree) const;
+
+ private:
+  void add_up();
 };
 /// Returns the moments of a brick's whole tetrahedron, from the brick's summary.
 Moments moments_of(const volume::BrickSummary& summary, std::uint32_t permutation, const glm::ivec3& corner,
@@ -85,7 +103,7 @@ class Statistics {
     glm::ivec3 corner{0};
     int log2_size = 0;
     std::uint32_t child = 0;       ///< first of 8 children (x fastest bit), 0: none
-    std::int32_t values = -1;      ///< brick payload: index into brick_values(), -1: none
+    std::int32_t values = -1;      ///< brick payload: its number, -1: none
     float uniform = 0.0F;          ///< the value if there are neither children nor payload
     std::uint32_t moments = none;  ///< index of six Moments, none for a uniform node
     static constexpr std::uint32_t none = 0xffffffffU;
@@ -97,8 +115,12 @@ class Statistics {
 
   [[nodiscard]] const Cube& cube() const { return cube_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
-  /// Returns the 512 values of a brick node, possibly stored in `room`. Not available for a brick with a summary.
+  [[nodiscard]] bool interpolates() const { return cube_.interpolation == Interpolation::linear; }
+  /// Returns the 512 values of a brick node, possibly stored in `room`: of its voxels, or with interpolation the means
+  /// of its cells. Not available for a brick with a summary.
   const float* values(const Node& node, volume::BrickValues::Brick& room) const;
+  /// Reads the voxels at the lattice points of a brick node. Only with interpolation.
+  void read_corners(const Node& node, BrickCorners& corners) const;
   /// Returns the summary of a GPU-resident brick node, else null.
   [[nodiscard]] const volume::BrickSummary* summary(const Node& node) const {
     return on_device_ && node.values >= 0 ? &on_device_->summary(static_cast<std::size_t>(node.values)) : nullptr;
@@ -128,6 +150,12 @@ class Statistics {
 
  private:
   void build_topology(const volume::ScalarVolume& volume, Progress* progress);
+  // Sets the values of a node of a brick's size, and stores them if the volume has no such brick. tiles: all that
+  // overlap the node.
+  void set_values(Node& node, const std::optional<std::uint32_t>& brick, const std::vector<std::uint32_t>& tiles);
+  // Sets the values of such a node with interpolation: those of its lattice points. Sets its uniform value if all are
+  // equal. tiles: all that overlap its lattice points.
+  void set_corners(Node& node, const std::vector<std::uint32_t>& tiles);
   void compute_moments(Progress* progress);
   void compute_mean_optical_depth(const volume::ScalarVolume& volume, Progress* progress);
 
@@ -135,10 +163,24 @@ class Statistics {
   std::vector<Node> nodes_;
   std::vector<std::vector<std::uint32_t>> by_size_;
   std::vector<Moments> moments_;
-  const volume::BrickValues* brick_values_;
+  const volume::ScalarVolume* volume_;
   volume::DeviceBricksPtr on_device_;
-  std::vector<float> extra_values_;  // payloads of bricks in which a tile or the background ends
+  std::vector<float> extra_values_;  // payloads of bricks in which a tile or the background ends: voxels, or corners
   double mean_optical_depth_ = 0.0;
+};
+
+/// The values of one brick, for the sums of its tetrahedra.
+class BrickField {
+ public:
+  void read(const Statistics& statistics, const Statistics::Node& node);
+  void sum(const BrickTree& tree, BrickSums& sums) const;
+
+ private:
+  bool interpolates_ = false;
+  float reference_ = 0.0F;
+  const float* values_ = nullptr;  // without interpolation
+  volume::BrickValues::Brick room_{};
+  BrickCorners corners_{};
 };
 
 /// Moments of a cell in which f is uniform.

@@ -29,6 +29,11 @@ VolumeAssetPtr open_of(const VolumeAssetPtr& volume, double seconds, Progress& p
   }
 }
 
+// Returns the volume with the interpolation of these settings.
+VolumeAssetPtr field_of(const VolumeAssetPtr& volume, const BuildSettings& settings) {
+  return settings.interpolation == grid::Interpolation::linear ? volume->interpolated() : volume;
+}
+
 // Density scale for values in `unit`, limited to the maximum extinction of path tracing.
 double density_scale_in(double unit, const volume::ScalarVolume& voxels, const grid::Cube& cube, double scale) {
   const glm::dmat3 axes(cube.to_world);
@@ -37,11 +42,22 @@ double density_scale_in(double unit, const volume::ScalarVolume& voxels, const g
   return max_value > 0.0 ? std::min(scale * unit, scene::max_extinction(edge) / max_value) : scale * unit;
 }
 
+bool interpolates(const BuildSettings& settings) { return settings.interpolation == grid::Interpolation::linear; }
+
+// Returns whether the GPU builds a tetrahedral grid; logs the reason if the CPU builds it instead.
+bool builds_on_gpu(const Log& log, const VolumeAsset& volume, const BuildSettings& settings, bool moves) {
+  if (settings.on != BuildOn::gpu) return false;
+  if (!moves && !interpolates(settings)) return true;
+  log.info(volume.name() + ": its grid is built on the CPU because it has " +
+           (moves ? "motion blur" : "linear interpolation"));
+  return false;
+}
+
 }  // namespace
 
 bool needs_values(const VolumeAsset& volume, const BuildSettings& settings) {
-  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || !settings.density_ramp.empty() ||
-         volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
+  return settings.march != scene::March::tet || settings.on != BuildOn::gpu || interpolates(settings) ||
+         !settings.density_ramp.empty() || volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
 }
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -64,7 +80,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.moves = volume->moves();
   Stopwatch watch;
   const VolumeAssetPtr moving = open_of(volume, settings.shutter_seconds, progress);
-  const VolumeAsset& shown = moving ? *moving : *volume;
+  const VolumeAssetPtr asset = field_of(moving ? moving : volume, settings);
+  const VolumeAsset& shown = *asset;
   if (moving && 0.5 * settings.shutter_seconds * volume->fastest() > volume::farthest_voxels)
     log.info(volume->name() + ": motion blur is limited to 64 voxels per half shutter time");
   const double taken = watch.lap();
@@ -85,15 +102,14 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     built.seconds.records = watch.lap();
     return built;
   }
-  if (settings.on == BuildOn::gpu && moving)
-    log.info(volume->name() + ": its grid is built on the CPU because it has motion blur");
+  const bool on_gpu = builds_on_gpu(log, *volume, settings, moving != nullptr);
   const Carried carried = Carried::of(channels);
   const std::uint64_t max_cells = settings.refine.max_cells;
   grid::RefineSettings refine = settings.refine;
   refine.density_scale = density_scale_in(unit, *voxels, statistics->cube(), settings.refine.density_scale);
   grid::LatticePtr lattice;
   std::optional<std::uint64_t> planned;
-  if (settings.on == BuildOn::gpu && !moving) {
+  if (on_gpu) {
     lattice = volume->lattice(settings.density_ramp, channels, refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), resource_limits);
     if (!planned && in_gl) {

@@ -17,6 +17,7 @@ enum class BuildOn { cpu = 0, gpu = 1 };
 struct BuildSettings {
   scene::March march = scene::March::tet;
   BuildOn on = BuildOn::cpu;
+  grid::Interpolation interpolation = grid::Interpolation::nearest;
   grid::RefineSettings refine;
   volume::Ramp density_ramp;
   scene::Emission emission;

@@ -14,6 +14,7 @@
 #include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "gl/bindings.hpp"
+#include "grid/brick_voxels.hpp"
 #include "grid/cell.hpp"
 
 namespace cumulet::render {
@@ -40,25 +41,28 @@ bool holds_motion(const gl::Limits& limits, const ivec3& size) {
   return std::max({size.x, size.y, size.z}) <= limits.texture_size_3d && voxels.x * voxels.y * voxels.z <= most;
 }
 
-// Calls put(index in the slices, value) for each voxel of the slices [first, last) of a dense volume.
+// Calls put(index in the slices, value) for each voxel of the slices [first, last) of a dense volume. Voxels outside
+// the cube are 0 and left out.
 template <class Put>
 void for_slab(const scene::MarchSource& source, const grid::Statistics& statistics, int first, int last,
               const Put& put) {
   const ivec3 low = source.box_low;
-  const ivec3 high = low + source.box_size;
-  const auto row = static_cast<std::size_t>(source.box_size.x);
-  const std::size_t slice = row * static_cast<std::size_t>(source.box_size.y);
+  const ivec3 size = source.voxel_count();
+  const ivec3 high = glm::min(low + size, ivec3(statistics.cube().size()));
+  last = std::min(last, high.z);
+  if (first >= last) return;
+  const auto row = static_cast<std::size_t>(size.x);
+  const std::size_t slice = row * static_cast<std::size_t>(size.y);
   tbb::parallel_for(low.y >> 3, (high.y + 7) >> 3, [&](int by) {
-    volume::BrickValues::Brick room;
+    grid::BrickVoxels brick;
     for (int x = low.x & ~7; x < high.x; x += volume::brick_size) {
-      const grid::Statistics::Node& node = statistics.node_at({x, by * 8, first & ~7});
-      const float* values = node.is_uniform() ? nullptr : statistics.values(node, room);
+      brick.look_up(statistics, {x, by * 8, first & ~7});
       const ivec3 from = glm::max(ivec3(x, by * 8, first), low);
       const ivec3 to = glm::min(ivec3(x + 8, by * 8 + 8, last), high);
       for (int k = from.z; k < to.z; ++k) {
         for (int j = from.y; j < to.y; ++j) {
           for (int i = from.x; i < to.x; ++i) {
-            const float value = values == nullptr ? node.uniform : values[(i & 7) * 64 + (j & 7) * 8 + (k & 7)];
+            const float value = brick.at(i & 7, j & 7, k & 7);
             const std::size_t at = static_cast<std::size_t>(k - first) * slice +
                                    static_cast<std::size_t>(j - low.y) * row + static_cast<std::size_t>(i - low.x);
             put(at, value);
@@ -435,8 +439,7 @@ void MarchUpload::plan_trees(gl::WordHeap& heap) {
 }
 
 void MarchUpload::plan_dense() {
-  const ivec3 size = source_->box_size;
-  require_3d(limits_, size, "the dense grid");
+  require_3d(limits_, source_->voxel_count(), "the dense grid");
   plan_voxels(data_.textures_[0], {&*source_->statistics}, GL_R16F, GL_RED, source_->density_a_value(),
               "creating the dense texture");
 }
@@ -447,7 +450,7 @@ void MarchUpload::plan_channel_voxels() {
     return data_.voxel_channels_[grid::index_of(channel)];
   };
   const auto plan = [this](gl::Object& texture, const grid::RgbField& field, float unit, const char* what) {
-    require_3d(limits_, source_->box_size, "creating the voxel colors");
+    require_3d(limits_, source_->voxel_count(), "creating the voxel colors");
     plan_voxels(texture, {&field.component(0), &field.component(1), &field.component(2), nullptr}, GL_RGBA16F, GL_RGBA,
                 1.0F / unit, what);
   };
@@ -459,7 +462,7 @@ void MarchUpload::plan_channel_voxels() {
   if (const grid::RgbField* scattering = source_->channels.scattering.get())
     plan(texture_of(Channel::color), *scattering, source_->max_value, "creating the voxel scattering data");
   if (const grid::ScalarField* forward = source_->channels.forward.get()) {
-    require_3d(limits_, source_->box_size, "creating the voxel anisotropy");
+    require_3d(limits_, source_->voxel_count(), "creating the voxel anisotropy");
     plan_slabs(texture_of(Channel::anisotropy), {GL_R16_SNORM, GL_RED, GL_SHORT, 1}, "creating the voxel anisotropy",
                [this, forward](std::span<std::uint16_t> slab, int first, int last) {
                  const std::vector<float> scattering = scattering_slab(*source_, slab.size(), first, last);
@@ -469,7 +472,7 @@ void MarchUpload::plan_channel_voxels() {
                });
   }
   if (const grid::DensityEnds* ends = source_->channels.ends.get(); ends != nullptr && source_->march == March::dense) {
-    require_3d(limits_, source_->box_size, "creating the voxel changes");
+    require_3d(limits_, source_->voxel_count(), "creating the voxel changes");
     plan_slabs(data_.changes_, {GL_R16F, GL_RED, GL_HALF_FLOAT, 1}, "creating the voxel changes",
                [this, ends](std::span<std::uint16_t> slab, int first, int last) {
                  std::vector<float> changes(slab.size());
@@ -483,7 +486,7 @@ void MarchUpload::plan_channel_voxels() {
                  std::ranges::transform(changes, slab.begin(), [](float value) { return glm::packHalf1x16(value); });
                });
   }
-  const bool shows_motion = holds_motion(limits_, source_->box_size);
+  const bool shows_motion = holds_motion(limits_, source_->voxel_count());
   if (!shows_motion) data_.parts_[0].grid.moves = 0;
   if (const grid::MomentumField* momentum = source_->channels.momentum.get(); momentum != nullptr && shows_motion) {
     plan_slabs(texture_of(Channel::velocity), {GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT, 4}, "creating the voxel velocities",
@@ -516,7 +519,7 @@ void MarchUpload::plan_voxels(gl::Object& texture, const std::vector<const grid:
 }
 
 void MarchUpload::plan_slabs(gl::Object& texture, const Texels& texels, const char* what, const FillSlab& fill) {
-  const ivec3 size = source_->box_size;
+  const ivec3 size = source_->voxel_count();
   data_.bytes_ += static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
                   static_cast<std::uint64_t>(size.z) * 2 * texels.count;
   upload_.add([this, &texture, size, texels, what] {

@@ -30,7 +30,7 @@ class MarchData {
 
   [[nodiscard]] March march() const { return march_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// Whether the density of tetrahedral cells is linear; else it is constant.
+  /// Whether the density varies in cells: linear in tetrahedra, trilinear between voxels. Else it is constant.
   [[nodiscard]] bool is_linear() const { return linear_; }
   /// Number of pages of cell records; at most max_pages.
   [[nodiscard]] std::size_t pages() const { return cells_.size(); }

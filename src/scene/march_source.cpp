@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "grid/brick_voxels.hpp"
 
 namespace cumulet::scene {
 
@@ -22,33 +23,29 @@ class BrickChange {
   // Looks up the brick at this corner. Returns whether its values change.
   bool look_up(const ivec3& corner) {
     if (ends_ == nullptr) return false;
-    const std::array fields{&ends_->open.statistics(), &ends_->close.statistics()};
-    for (std::size_t i = 0; i < 2; ++i) {
-      const grid::Statistics::Node& node = fields[i]->node_at(corner);
-      values_[i] = node.is_uniform() ? nullptr : fields[i]->values(node, rooms_[i]);
-      uniform_[i] = node.uniform;
-    }
-    return values_[0] != nullptr || values_[1] != nullptr || uniform_[0] != uniform_[1];
+    open_.look_up(ends_->open.statistics(), corner);
+    close_.look_up(ends_->close.statistics(), corner);
+    return !open_.uniform() || open_.uniform() != close_.uniform();
   }
-  [[nodiscard]] float operator[](int i) const { return scale_ * (of(1, i) - of(0, i)); }
+  [[nodiscard]] float operator[](int i) const { return scale_ * (close_[i] - open_[i]); }
 
  private:
-  [[nodiscard]] float of(std::size_t end, int i) const {
-    return values_[end] == nullptr ? uniform_[end] : values_[end][i];
-  }
   const grid::DensityEnds* ends_;
   float scale_;
-  std::array<const float*, 2> values_{};
-  std::array<float, 2> uniform_{};
-  std::array<volume::BrickValues::Brick, 2> rooms_{};
+  grid::BrickVoxels open_;
+  grid::BrickVoxels close_;
 };
 
-// Appends a brick. values: null if all values are the node's uniform value.
-void add_brick(MarchSource& source, const grid::Statistics::Node& node, const float* values,
-               const BrickChange* change) {
+int voxels_per_slot(const MarchSource& source) {
+  const int side = source.brick_side();
+  return side * side * side;
+}
+
+// Appends a brick.
+void add_brick(MarchSource& source, const grid::BrickVoxels& voxels, const BrickChange* change) {
   const float scale = source.density_a_value();
-  for (int i = 0; i < volume::brick_voxels; ++i) {
-    source.brick_values.push_back(glm::packHalf1x16((values == nullptr ? node.uniform : values[i]) * scale));
+  for (int i = 0; i < voxels_per_slot(source); ++i) {
+    source.brick_values.push_back(glm::packHalf1x16(voxels[i] * scale));
     if (source.channels.ends)
       source.brick_changes.push_back(glm::packHalf1x16(change != nullptr ? (*change)[i] : 0.0F));
   }
@@ -76,29 +73,29 @@ void pack_bricks(MarchSource& source) {
   constexpr std::uint32_t empty = 0xfffffffeU;
   std::unordered_map<float, std::uint32_t> uniform_slots;
   std::uint32_t count = 0;
-  volume::BrickValues::Brick room;
+  grid::BrickVoxels voxels;
   BrickChange change(source.channels.ends.get(), source.density_a_value());
   const auto pack = [&](const ivec3& corner) {
-    const grid::Statistics::Node& node = statistics.node_at(corner);
+    voxels.look_up(statistics, corner);
     const bool dark = !source.channels.emission || source.channels.emission->is_zero(corner);
     const bool changes = change.look_up(corner);
-    if (node.is_uniform() && node.uniform == 0.0F && dark) return source.brick_slots.push_back(empty);
-    if (node.is_uniform() && !changes) {
-      const auto [found, added] = uniform_slots.emplace(node.uniform, count);
+    if (voxels.uniform() == 0.0F && dark) return source.brick_slots.push_back(empty);
+    if (voxels.uniform() && !changes) {
+      const auto [found, added] = uniform_slots.emplace(*voxels.uniform(), count);
       source.brick_slots.push_back(found->second);
       if (!added) return;
     } else {
       source.brick_slots.push_back(count);
     }
     ++count;
-    add_brick(source, node, node.is_uniform() ? nullptr : statistics.values(node, room), changes ? &change : nullptr);
+    add_brick(source, voxels, changes ? &change : nullptr);
   };
   for (int z = 0; z < source.brick_count.z; ++z) {
     for (int y = 0; y < source.brick_count.y; ++y) {
       for (int x = 0; x < source.brick_count.x; ++x) pack((first + ivec3(x, y, z)) * 8);
     }
   }
-  if (source.brick_values.empty()) source.brick_values.resize(volume::brick_voxels);
+  if (source.brick_values.empty()) source.brick_values.resize(static_cast<std::size_t>(voxels_per_slot(source)));
   if (source.channels.ends) source.brick_changes.resize(source.brick_values.size());
 }
 
@@ -134,6 +131,7 @@ MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarV
   source.march = march;
   source.cube = statistics->cube();
   source.max_value = volume->max_value;
+  source.linear = statistics->interpolates();
   ivec3 low = volume->bounds_min;
   ivec3 high = volume->bounds_max;
   if (volume->empty()) low = high = source.cube.origin;
@@ -141,6 +139,8 @@ MarchSource make_voxel_source(March march, std::shared_ptr<const volume::ScalarV
     low = volume->empty() ? emission->bounds_min() : glm::min(low, emission->bounds_min());
     high = volume->empty() ? emission->bounds_max() : glm::max(high, emission->bounds_max());
   }
+  // The field falls to 0 within a voxel. The emission's bounds are those of whole bricks, which may end at the cube.
+  if (source.linear) low = glm::max(low - 1, source.cube.origin);
   source.box_low = low - source.cube.origin;
   source.box_size = high - low + 1;
   source.channels = std::move(channels);

@@ -35,15 +35,15 @@ struct MarchSource {
   // tet: the grid, or the plan to build it in GL; a plan also needs the volume and its statistics
   std::shared_ptr<const grid::TetGrid> grid;
   GridPlanPtr plan;
-  bool linear = false;
+  bool linear = false;     // tet: density is linear in a cell; dense, brick: interpolated between voxels
   EmissiveTable emissive;  // of the grid; if GL builds the grid, it is known only after the build
   // dense: GL reads from these; brick: packed by make_voxel_source
   std::shared_ptr<const volume::ScalarVolume> volume;
   std::shared_ptr<const grid::Statistics> statistics;
-  glm::ivec3 box_low{0};  // voxels, cube space
+  glm::ivec3 box_low{0};  // cells, cube space: voxels, or with interpolation the cubes between eight of them
   glm::ivec3 box_size{0};
-  std::vector<std::uint16_t> brick_values;   // half floats, 512 per slot
-  std::vector<std::uint16_t> brick_changes;  // 512 per slot: half the change while the shutter is open; else empty
+  std::vector<std::uint16_t> brick_values;   // half floats, brick_side()^3 per slot
+  std::vector<std::uint16_t> brick_changes;  // the same: half the change while the shutter is open; else empty
   std::vector<std::uint32_t> brick_slots;
   glm::ivec3 brick_count{0};
   grid::Channels channels;
@@ -52,6 +52,10 @@ struct MarchSource {
   [[nodiscard]] bool goes_with(const MarchSource& other) const {
     return march == other.march && linear == other.linear;
   }
+  /// dense: number of voxels that the cells of the box use, along each axis.
+  [[nodiscard]] glm::ivec3 voxel_count() const { return box_size + (linear ? 1 : 0); }
+  /// brick: number of voxels that the cells of a brick use, along each axis.
+  [[nodiscard]] int brick_side() const { return linear ? grid::brick_corners : volume::brick_size; }
   [[nodiscard]] bool has(grid::Channel channel) const {
     const grid::ChannelRow& row = grid::row_of(channel);
     return row.is_in(channels) || (grid && !row.records(*grid).empty());

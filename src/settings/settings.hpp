@@ -20,6 +20,9 @@ inline constexpr std::array grid_type_choices = {
 inline constexpr std::array cells_choices = {
     Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "One density per cell: the mean."},
     Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
+inline constexpr std::array voxel_interpolation_choices = {
+    Choice{"nearest", CUMULET_INTERPOLATION_NEAREST, "Nearest", "A voxel is a cube of constant value."},
+    Choice{"linear", CUMULET_INTERPOLATION_LINEAR, "Linear", "Trilinear interpolation between the centers of voxels."}};
 inline constexpr std::array criterion_choices = {
     Choice{"transmittance", CUMULET_CRITERION_TRANSMITTANCE, "Transmittance",
            "Density error weighted by visibility (two-way transmittance)."},
@@ -451,7 +454,12 @@ struct Table<cumulet_grid_desc> {
                 "built on the CPU",
         .row = {.label = "Build on",
                 .tip = "Where the grid is built. The GPU is faster when the camera moves with a camera-adaptive "
-                       "grid."}})};
+                       "grid."}}),
+      Setting(&Desc::interpolation, {.name = "interpolation", .choices = voxel_interpolation_choices,
+        .key = "grid.interpolation", .flag = "--interpolation",
+        .help = "Interpolation between voxels: constant cubes, or trilinear between their centers (default: nearest)",
+        .row = {.label = "Interpolation",
+                .tip = "The density between the centers of voxels."}})};
 };
 
 template <>

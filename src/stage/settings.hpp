@@ -33,6 +33,8 @@ struct GridSettings {
     GridSettings s;
     s.build.march = static_cast<scene::March>(d.type);
     s.build.on = static_cast<BuildOn>(d.build_device);
+    s.build.interpolation =
+        d.interpolation == CUMULET_INTERPOLATION_LINEAR ? grid::Interpolation::linear : grid::Interpolation::nearest;
     grid::RefineSettings& refine = s.build.refine;
     refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
     const cumulet_refinement_criterion criterion = settings::criterion_of(d);

@@ -672,9 +672,10 @@ void VolumeStage::keep_to_one_march(std::vector<scene::Volume>& volumes,
   // While grids are being built, keep volumes that match the displayed ones; afterwards those that match the settings.
   const auto fits = [&](const scene::Volume& volume) {
     if (building && !before.empty()) return volume.source->goes_with(*before.front().source);
-    return volume.source->march == grid_.build.march &&
-           (volume.source->march != scene::March::tet ||
-            volume.source->linear == (grid_.build.refine.cells == grid::CellKind::linear));
+    const bool linear = grid_.build.march == scene::March::tet
+                            ? grid_.build.refine.cells == grid::CellKind::linear
+                            : grid_.build.interpolation == grid::Interpolation::linear;
+    return volume.source->march == grid_.build.march && volume.source->linear == linear;
   };
   for (scene::Volume& volume : volumes) {
     if (fits(volume)) continue;

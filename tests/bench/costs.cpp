@@ -157,10 +157,11 @@ scene::ModelSourcePtr emitter_at(const Position& position, double side, float ra
 // Disables the emission that scattered rays accumulate along their path, and adds it only at collisions (emission
 // divided by extinction).
 constexpr Edit no_way = {"free_flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n", ""};
-constexpr Edit where_they_collide = {
-    "free_flight.glsl", "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
-    "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
-    "    if (way < left) emitted += emission.mean * (there / max(mix(e_0, e_1, way / max(span, 1e-30f)), 1e-30f));\n"};
+constexpr Edit where_they_collide = {"free_flight.glsl",
+                                     "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
+                                     "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
+                                     "    if (way < left) emitted += emission.mean * (there / max(cm_segment_at(e, way "
+                                     "/ max(span, 1e-30f)), 1e-30f));\n"};
 // Disables NEE of emissive cells: if there is no other light, or among other lights.
 constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
                                  "arrived && cm.lights.any != 0u && cm.lights.cell_probability < 1.0f;"};

@@ -90,7 +90,9 @@ TEST(PathFeatures, NeedOnlyDeclaredVariantsForEachGrid) {
     for (const bool wide : {false, true}) grids.push_back({March::tet, linear, 6, wide, true});
   }
   for (const March march : {March::dense, March::brick}) {
-    for (const bool several : {false, true}) grids.push_back({march, false, 1, false, several});
+    for (const bool linear : {false, true}) {
+      for (const bool several : {false, true}) grids.push_back({march, linear, 1, false, several});
+    }
   }
   for (const GridFeatures& grid : grids) {
     for (const bool motion : {false, true}) {

@@ -28,7 +28,7 @@ TEST(Shaders, ListTheirVariants) {
   EXPECT_TRUE(has("trace_travel.comp", {"CM_MARCH 2", "CM_LINEAR 0", "CM_SURFACES 2", "CM_PAGES 1"}));
   EXPECT_TRUE(has("sign.comp", {}));
   EXPECT_FALSE(has("trace.comp", {})) << "it needs its march";
-  EXPECT_FALSE(has("trace.comp", {"CM_MARCH 1", "CM_LINEAR 1", "CM_PAGES 1"})) << "voxels are not linear";
+  EXPECT_TRUE(has("trace.comp", {"CM_MARCH 1", "CM_LINEAR 1", "CM_PAGES 1"})) << "voxels with interpolation";
   EXPECT_FALSE(has("trace.comp", {"CM_MARCH 0", "CM_LINEAR 1", "CM_PAGES 7"}));
   EXPECT_FALSE(has("trace.comp", {"CM_MARCH 0", "CM_LINEAR 1", "CM_PAGES 1", "CM_LAYERS 2"}));
   EXPECT_FALSE(has("trace.comp", {"CM_MARCH 0", "CM_LINEAR 1", "CM_PAGES 1", "CM_CHUNK 4"}));

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "base/error.hpp"
+#include "support/delta_tracker.hpp"
 #include "support/gl_viewer.hpp"
 #include "support/marches.hpp"
 #include "support/osmesa_leaks.hpp"
@@ -124,127 +125,37 @@ TEST_P(Trace, MediumInThermalBalanceIsInvisible) {
   }
 }
 
-// An independent path tracer: delta tracking over the voxels, no NEE towards the sky, no Russian roulette;
-// transmittance towards the sun by delta tracking. It shares only the definition of the medium with glsl/.
-class Reference {
- public:
-  Reference(const volume::ScalarVolume& volume, double scale, const dvec3& albedo, double g, const dvec3& sun,
-            const dvec3& irradiance, const dvec3& sky, const dvec3& emission)
-      : volume_(&volume),
-        scale_(scale),
-        albedo_(albedo),
-        g_(g),
-        sun_(sun),
-        irradiance_(irradiance),
-        sky_(sky),
-        emission_(emission) {}
-
-  dvec3 path(dvec3 o, dvec3 d) {
-    dvec3 weight(1.0);
-    dvec3 radiance(0.0);
-    while (true) {
-      const auto hit = collide(o, d);
-      if (!hit) return radiance + weight * sky_;
-      o = *hit;
-      radiance += weight * emission_;
-      weight *= albedo_;
-      const double cosine = glm::dot(d, sun_);
-      const double phase =
-          (1.0 - g_ * g_) / (4.0 * std::numbers::pi * std::pow(1.0 + g_ * g_ - 2.0 * g_ * cosine, 1.5));
-      if (!collide(o, sun_)) radiance += weight * phase * irradiance_;
-      d = scatter(d);
-    }
-  }
-  double uniform() { return uniform_(engine_); }
-
- private:
-  std::optional<dvec3> collide(const dvec3& o, const dvec3& d) {
-    const dvec3 low = dvec3(volume_->bounds_min) - 0.5;
-    const dvec3 high = dvec3(volume_->bounds_max) + 0.5;
-    double t0 = 0.0;
-    double t1 = 1e30;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double a = (low[axis] - o[axis]) / d[axis];
-      const double b = (high[axis] - o[axis]) / d[axis];
-      t0 = std::max(t0, std::min(a, b));
-      t1 = std::min(t1, std::max(a, b));
-    }
-    const double majorant = scale_ * volume_->max_value;
-    for (double t = t0;;) {
-      t -= std::log(1.0 - uniform()) / majorant;
-      if (t >= t1) return std::nullopt;
-      const dvec3 p = o + t * d;
-      const float density = test::value_at(*volume_, ivec3(glm::floor(p + 0.5)));
-      if (uniform() * volume_->max_value < density) return p;
-    }
-  }
-  dvec3 scatter(const dvec3& d) {
-    // Rejection sampling, so that no inversion formula is shared.
-    while (true) {
-      const double z = 2.0 * uniform() - 1.0;
-      const double angle = 2.0 * std::numbers::pi * uniform();
-      const double r = std::sqrt(1.0 - z * z);
-      const dvec3 w(r * std::cos(angle), r * std::sin(angle), z);
-      const double value = (1.0 - g_ * g_) / std::pow(1.0 + g_ * g_ - 2.0 * g_ * glm::dot(d, w), 1.5);
-      const double most = (1.0 + std::abs(g_)) / ((1.0 - std::abs(g_)) * (1.0 - std::abs(g_)));
-      if (uniform() * most < value) return w;
-    }
-  }
-
-  const volume::ScalarVolume* volume_;
-  double scale_;
-  dvec3 albedo_;
-  double g_;
-  dvec3 sun_, irradiance_, sky_, emission_;
-  std::mt19937_64 engine_{12345};
-  std::uniform_real_distribution<double> uniform_{0.0, 1.0};
-};
-
 TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
   const auto volume = test::noise_volume({20, 18, 22}, ivec3(0), 5);
   const dvec3 eye(60.0, 30.0, 70.0);
   const dvec3 target(9.5, 8.5, 10.5);
   const double fovy = 14.0;
-  const double azimuth = 40.0 * std::numbers::pi / 180.0;
-  const double elevation = 25.0 * std::numbers::pi / 180.0;
-  const dvec3 sun(std::sin(azimuth) * std::cos(elevation), std::sin(elevation),
-                  std::cos(azimuth) * std::cos(elevation));
-  const dvec3 albedo(0.95, 0.8, 0.5);
-  Reference reference(volume, 0.6, albedo, 0.4, sun, {3.0, 2.5, 2.0}, {0.3, 0.5, 0.8}, {0.2, 0.1, 0.05});
-  const dvec3 forward = glm::normalize(target - eye);
-  const dvec3 right = glm::normalize(glm::cross(forward, dvec3(0, 1, 0)));
-  const dvec3 up = glm::cross(right, forward);
-  const double tangent = std::tan(0.5 * fovy * std::numbers::pi / 180.0);
-  dvec3 sum(0.0);
-  dvec3 square(0.0);
-  const int paths = 400000;
-  for (int i = 0; i < paths; ++i) {
-    const dvec3 d = glm::normalize(forward + tangent * (2.0 * reference.uniform() - 1.0) * right +
-                                   tangent * (2.0 * reference.uniform() - 1.0) * up);
-    const dvec3 radiance = reference.path(eye, d);
-    sum += radiance;
-    square += radiance * radiance;
-  }
-  const dvec3 expected = sum / double(paths);
-  const dvec3 expected_error = glm::sqrt((square / double(paths) - expected * expected) / double(paths));
-
+  const test::TrackedMedium medium;
   const auto viewer = make();
   viewer->set_volume(volume);
-  viewer->set_medium({0.6, vec3(albedo), {0.4F}, 0, {0.2F, 0.1F, 0.05F}});
-  viewer->set_light({40.0F, 25.0F, {3.0F, 2.5F, 2.0F}, {0.3F, 0.5F, 0.8F}});
+  viewer->set_medium(
+      {medium.scale, vec3(medium.albedo), {static_cast<float>(medium.anisotropy)}, 0, vec3(medium.emission)});
+  viewer->set_light({40.0F, 25.0F, vec3(medium.irradiance), vec3(medium.sky)});
   viewer->set_camera(test::camera_at(eye, target, fovy));
-  for (const test::MarchKind& kind : test::march_kinds) {
-    viewer->set_grid(test::settings_of(kind));
-    const test::Picture a = test::render(*viewer, {32, 32, 96, 3, render::View::shaded});
-    const test::Picture b = test::render(*viewer, {32, 32, 96, 4, render::View::shaded});
-    for (int c = 0; c < 3; ++c) {
-      // The difference of the two renders gives the noise of their mean.
-      double difference = 0.0;
-      for (std::size_t i = 0; i < a.pixels.size(); ++i) difference += std::pow(a.pixels[i][c] - b.pixels[i][c], 2.0);
-      const double error = 0.5 * std::sqrt(difference) / double(a.pixels.size());
-      const double got = 0.5 * (a.mean()[c] + b.mean()[c]);
-      EXPECT_NEAR(got, expected[c], 4.0 * std::hypot(error, expected_error[c])) << "channel " << c;
-      EXPECT_LT(error, 0.01 * expected[c]);
+  for (const auto interpolation : {grid::Interpolation::nearest, grid::Interpolation::linear}) {
+    test::DeltaTracker reference(volume, interpolation, medium);
+    const test::TrackedMean expected =
+        reference.view(eye, target, fovy, interpolation == grid::Interpolation::linear ? 100000 : 400000);
+    for (const test::MarchKind& kind : test::march_kinds) {
+      viewer::GridSettings settings = test::settings_of(kind);
+      settings.build.interpolation = interpolation;
+      viewer->set_grid(settings);
+      const test::Picture a = test::render(*viewer, {32, 32, 96, 3, render::View::shaded});
+      const test::Picture b = test::render(*viewer, {32, 32, 96, 4, render::View::shaded});
+      for (int c = 0; c < 3; ++c) {
+        // The difference of the two renders gives the noise of their mean.
+        double difference = 0.0;
+        for (std::size_t i = 0; i < a.pixels.size(); ++i) difference += std::pow(a.pixels[i][c] - b.pixels[i][c], 2.0);
+        const double error = 0.5 * std::sqrt(difference) / double(a.pixels.size());
+        const double got = 0.5 * (a.mean()[c] + b.mean()[c]);
+        EXPECT_NEAR(got, expected.radiance[c], 4.0 * std::hypot(error, expected.error[c])) << "channel " << c;
+        EXPECT_LT(error, 0.01 * expected.radiance[c]);
+      }
     }
   }
 }

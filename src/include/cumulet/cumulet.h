@@ -2118,6 +2118,16 @@ typedef enum cumulet_cell_density {
   CUMULET_CELLS_CONSTANT = 1 /**< The mean. */
 } cumulet_cell_density;
 
+/** The field that voxels stand for. All fields of a volume are interpolated alike. */
+typedef enum cumulet_interpolation {
+  CUMULET_INTERPOLATION_NEAREST = 0, /**< A voxel is a cube of constant value. */
+  /**
+   * A voxel is a sample at its center, with trilinear interpolation between centers. The field ends half a voxel
+   * outside the voxels' box. Ramps and the emission of temperatures apply to voxels. The CPU builds tetrahedral grids.
+   */
+  CUMULET_INTERPOLATION_LINEAR = 1
+} cumulet_interpolation;
+
 /** The refinement criterion: the error indicator that decides which cells are split. */
 typedef enum cumulet_refinement_criterion {
   /** Standard deviation x edge length > threshold x mean optical depth. With a threshold of 0, the default,
@@ -2145,8 +2155,8 @@ typedef enum cumulet_build_device {
    * view-independent part once per volume and medium; a camera that moves then needs only the GPU passes.
    *
    * The CPU builds the grid instead, and the log has the reason, in these cases: the grid is larger than the driver's
-   * storage blocks; its build takes more GL memory than there is or than cumulet_limits_desc.gl_bytes allows; or it
-   * moves while the shutter is open.
+   * storage blocks; its build takes more GL memory than there is or than cumulet_limits_desc.gl_bytes allows; it moves
+   * while the shutter is open; or it has linear interpolation.
    */
   CUMULET_BUILD_GPU = 1
 } cumulet_build_device;
@@ -2169,6 +2179,7 @@ typedef struct cumulet_grid_desc {
   int32_t camera_adaptive;
   double pixel_size;                 /**< Pixels that a cell's longest edge must cover to be split, up to 1e6. 0: 1. */
   cumulet_build_device build_device; /**< The device that builds CUMULET_GRID_TETRAHEDRAL. */
+  cumulet_interpolation interpolation; /**< Interpolation between voxels, for all grid types. */
 } cumulet_grid_desc;
 
 /** The phase function: the distribution of scattered directions. */

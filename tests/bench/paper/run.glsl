@@ -28,12 +28,11 @@ bool cm_paper_march(inout uvec3 cell, vec3 o, vec3 d, inout float t, inout float
   bool collided = false;
   while (!collided && cell.x != CM_NONE) {
     float t_1 = 0.0;
-    float r_0 = 0.0;
-    float r_1 = 0.0;
+    CmBernstein r = CmBernstein(0.0);
     uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
-    cm_march_step(cell, ray, t, t_1, r_0, r_1, next);
+    cm_march_step(cell, ray, t, t_1, r, next);
     steps += 1u;
-    float extinction = CM_MEDIUM.extinction * 0.5 * (r_0 + r_1);
+    float extinction = CM_MEDIUM.extinction * cm_segment_mean(r);
     float used = extinction * (t_1 - t);
     collided = used > depth;
     if (collided) {
@@ -70,12 +69,11 @@ void cm_paper_path(inout CmPath p) {
     ray.cone = 0u;
     while (sun_cell.x != CM_NONE) {
       float t_1 = 0.0;
-      float r_0 = 0.0;
-      float r_1 = 0.0;
+      CmBernstein r = CmBernstein(0.0);
       uvec3 next = uvec3(CM_NONE, 0u, CM_NONE);
-      cm_march_step(sun_cell, ray, sun_t, t_1, r_0, r_1, next);
+      cm_march_step(sun_cell, ray, sun_t, t_1, r, next);
       p.steps += 1u;
-      sun_depth += CM_MEDIUM.extinction * 0.5 * (r_0 + r_1) * (t_1 - sun_t);
+      sun_depth += CM_MEDIUM.extinction * cm_segment_mean(r) * (t_1 - sun_t);
       sun_t = t_1;
       sun_cell = next;
     }

@@ -94,11 +94,10 @@ extern "C" __global__ void __launch_bounds__(64) cm_cost_step(float4* rays, uint
 #pragma unroll 1
   for (uint i = 0u; i < count && used <= depth && cell.x != CM_NONE; ++i) {
     float t_1;
-    float r_0;
-    float r_1;
+    CmBernstein r;
     uvec3 next;
-    cm_march_step(cell, ray, t, t_1, r_0, r_1, next);
-    used = extinction * (0.5f * (r_0 + r_1) * (t_1 - t));
+    cm_march_step(cell, ray, t, t_1, r, next);
+    used = extinction * (cm_segment_mean(r) * (t_1 - t));
     if (used <= depth) {
       depth -= used;
       t = t_1;
