@@ -51,6 +51,7 @@ std::shared_ptr<const Functions> load_functions(GetProc get_proc, void* user) {
   Loader loader{get_proc, user};
   const int version = gladLoadGLContextUserPtr(gl.get(), load_one, &loader);
   if (version == 0) {
+    if (gl->VERSION_4_5 != 0) check_all(*gl);  // glad itself calls glGetIntegerv
     if (is_between_begin_and_end(*gl, get_proc, user)) throw Error(ErrorCode::gl, between_begin_and_end_message);
     throw Error(ErrorCode::unsupported, "no OpenGL: get_proc returned no glGetString, or no context is current");
   }

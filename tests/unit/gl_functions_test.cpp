@@ -35,9 +35,10 @@ constexpr std::array<std::intptr_t, 5> no_addresses = {0, 1, 2, 3, -1};
 class GlFunctions : public cumulet::test::BackendTest {
  protected:
   void expect_refused(Incomplete incomplete, const std::string& text) {
+    SCOPED_TRACE(incomplete.lacks);
     try {
       (void)gl::load_functions(Incomplete::get_proc, &incomplete);
-      FAIL() << incomplete.lacks << " " << incomplete.answer << " was accepted";
+      FAIL() << incomplete.answer << " was accepted";
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::unsupported);
       EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
