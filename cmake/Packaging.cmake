@@ -18,6 +18,9 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/Cumulet)
 # our libraries. The tarball can therefore bundle those unmodified.
 file(RELATIVE_PATH bin_to_lib ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
 function(cumulet_rpath target lib)
+  if(NOT UNIX OR APPLE)
+    return()
+  endif()
   set_target_properties(${target} PROPERTIES INSTALL_RPATH ${lib}
                         BUILD_RPATH "${lib};${lib}/host/1;${lib}/host/2;${lib}/host/3;${lib}/fallback")
   target_link_options(${target} PRIVATE -Wl,--disable-new-dtags)
@@ -30,7 +33,9 @@ foreach(program cumulet-render cumulet-merge cumulet-scene cumulet-demo)
     list(APPEND programs ${program})
   endif()
 endforeach()
-cumulet_rpath(cumulet $ORIGIN)
+if(NOT CUMULET_STATIC)
+  cumulet_rpath(cumulet $ORIGIN)
+endif()
 set(libraries cumulet)
 if(TARGET cumulet_headless_c)
   cumulet_rpath(cumulet_headless_c $ORIGIN)
@@ -122,11 +127,17 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/CumuletConfigVersio
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/CumuletConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/CumuletConfigVersion.cmake
         DESTINATION ${package_dir} COMPONENT development)
+# pkg-config could not name all dependencies of a static library.
+if(CUMULET_STATIC)
+  install(FILES ${CMAKE_CURRENT_LIST_DIR}/CumuletLibraries.cmake DESTINATION ${package_dir} COMPONENT development)
+endif()
 
 set(pkgconfig_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH pc_to_prefix ${CMAKE_INSTALL_PREFIX}/${pkgconfig_dir} ${CMAKE_INSTALL_PREFIX})
 configure_file(${CMAKE_CURRENT_LIST_DIR}/cumulet.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
+if(NOT CUMULET_STATIC)
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cumulet.pc DESTINATION ${pkgconfig_dir} COMPONENT development)
+endif()
 
 # These pages link to each other; tests/package/install_test.sh follows the links.
 set(pages)

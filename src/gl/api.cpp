@@ -11,7 +11,7 @@ namespace cumulet::gl {
 namespace {
 
 struct Loader {
-  void* (*get_proc)(void* user, const char* name);
+  GetProc get_proc;
   void* user;
 };
 
@@ -22,24 +22,36 @@ const GLubyte* no_string(GLenum /*name*/, GLuint /*index*/) { return reinterpret
 GLADapiproc load_one(void* loader, const char* name) {
   const auto* l = static_cast<const Loader*>(loader);
   if (std::strcmp(name, "glGetStringi") == 0) return reinterpret_cast<GLADapiproc>(no_string);
-  return reinterpret_cast<GLADapiproc>(l->get_proc(l->user, name));
+  return proc_address<GLADapiproc>(l->get_proc, l->user, name);
 }
 
 // A current context returns its version unless it is lost or the thread is between glBegin and glEnd.
-bool is_between_begin_and_end(const Functions& gl, void* (*get_proc)(void* user, const char* name), void* user) {
+bool is_between_begin_and_end(const Functions& gl, GetProc get_proc, void* user) {
   if (gl.GetString == nullptr || find_current_context(get_proc, user) == nullptr) return false;
-  const auto reset_status =
-      reinterpret_cast<PFNGLGETGRAPHICSRESETSTATUSPROC>(get_proc(user, "glGetGraphicsResetStatus"));
+  const auto reset_status = proc_address<PFNGLGETGRAPHICSRESETSTATUSPROC>(get_proc, user, "glGetGraphicsResetStatus");
   return reset_status != nullptr && reset_status() == GL_NO_ERROR;
+}
+
+/// Throws for the first function that the library calls and the host does not return.
+void check_all(const GladGLContext& gl) {
+  const auto check_one = [](auto function, const char* name) {
+    if (function != nullptr) return;
+    throw Error(ErrorCode::unsupported,
+                std::string("the context reports OpenGL 4.5, but get_proc does not return ") + name);
+  };
+#define CUMULET_GL_FUNCTION(NAME) check_one(gl.NAME, "gl" #NAME);
+#include "gl_functions.inc"
+#undef CUMULET_GL_FUNCTION
 }
 
 }  // namespace
 
-std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user) {
+std::shared_ptr<const Functions> load_functions(GetProc get_proc, void* user) {
   auto gl = std::make_shared<Functions>();
   Loader loader{get_proc, user};
   const int version = gladLoadGLContextUserPtr(gl.get(), load_one, &loader);
   if (version == 0) {
+    if (gl->VERSION_4_5 != 0) check_all(*gl);  // glad itself calls glGetIntegerv
     if (is_between_begin_and_end(*gl, get_proc, user)) throw Error(ErrorCode::gl, between_begin_and_end_message);
     throw Error(ErrorCode::unsupported, "no OpenGL: get_proc returned no glGetString, or no context is current");
   }
@@ -48,11 +60,8 @@ std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, co
                                             std::to_string(GLAD_VERSION_MAJOR(version)) + "." +
                                             std::to_string(GLAD_VERSION_MINOR(version)));
   }
-  gl->GetStringi = reinterpret_cast<PFNGLGETSTRINGIPROC>(get_proc(user, "glGetStringi"));
-  if (gl->DispatchCompute == nullptr || gl->CreateBuffers == nullptr || gl->TextureBuffer == nullptr) {
-    throw Error(ErrorCode::unsupported,
-                "the context reports OpenGL 4.5, but get_proc does not return all of its functions");
-  }
+  gl->GetStringi = proc_address<PFNGLGETSTRINGIPROC>(get_proc, user, "glGetStringi");
+  check_all(*gl);
   GLint draw_buffers = 0;
   gl->GetIntegerv(GL_MAX_DRAW_BUFFERS, &draw_buffers);
   gl->draw_buffers = static_cast<GLuint>(std::clamp(draw_buffers, 1, 16));
@@ -96,9 +105,7 @@ void check(const Functions& gl, const char* step) {
   throw Error(ErrorCode::gl, "GL error " + std::to_string(first) + ": " + step);
 }
 
-bool was_reset(const Functions& gl) {
-  return gl.GetGraphicsResetStatus != nullptr && gl.GetGraphicsResetStatus() != GL_NO_ERROR;
-}
+bool was_reset(const Functions& gl) { return gl.GetGraphicsResetStatus() != GL_NO_ERROR; }
 
 void check_reset(const Functions& gl) {
   if (was_reset(gl)) throw Error(ErrorCode::context_lost, reset_message);

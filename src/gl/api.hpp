@@ -9,6 +9,8 @@
 #include <string>
 #include <unordered_map>
 
+#include "gl/proc_address.hpp"
+
 namespace cumulet::gl {
 
 class StateGuard;
@@ -106,8 +108,9 @@ struct Limits {
   int texture_size_2d = 0;
 };
 
-/// Loads the table and checks for OpenGL 4.5 with compute shaders. Throws Error(unsupported) with the missing feature.
-std::shared_ptr<const Functions> load_functions(void* (*get_proc)(void* user, const char* name), void* user);
+/// Loads the table and checks for OpenGL 4.5 and for each function that the library calls. Throws Error(unsupported)
+/// with the version or the name of the function.
+std::shared_ptr<const Functions> load_functions(GetProc get_proc, void* user);
 /// Copies the functions, but not the state, for objects that outlive the viewer that owns `gl`.
 std::shared_ptr<const Functions> copy_of(const Functions& gl);
 Limits query_limits(const Functions& gl);

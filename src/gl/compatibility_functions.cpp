@@ -10,8 +10,8 @@ namespace cumulet::gl {
 namespace {
 
 template <class Function>
-void load(Function& function, CompatibilityFunctions::GetProc get_proc, void* user, const char* name) {
-  function = reinterpret_cast<Function>(get_proc(user, name));
+void load(Function& function, GetProc get_proc, void* user, const char* name) {
+  function = proc_address<Function>(get_proc, user, name);
   if (function != nullptr) return;
   throw Error(ErrorCode::unsupported,
               std::string("the context has the compatibility profile, but get_proc does not return ") + name +
@@ -20,17 +20,17 @@ void load(Function& function, CompatibilityFunctions::GetProc get_proc, void* us
 
 }  // namespace
 
-void* (*find_current_context(CompatibilityFunctions::GetProc get_proc, void* user))() {
+void* (*find_current_context(GetProc get_proc, void* user))() {
   for (const char* name :
        {"eglGetCurrentContext", "OSMesaGetCurrentContext", "wglGetCurrentContext", "glXGetCurrentContext"}) {
-    const auto query = reinterpret_cast<void* (*)()>(get_proc(user, name));
+    const auto query = proc_address<void* (*)()>(get_proc, user, name);
     if (query != nullptr && query() != nullptr) return query;
   }
   return nullptr;
 }
 
-std::shared_ptr<const CompatibilityFunctions> load_compatibility(const GladGLContext& gl,
-                                                                 CompatibilityFunctions::GetProc get_proc, void* user) {
+std::shared_ptr<const CompatibilityFunctions> load_compatibility(const GladGLContext& gl, GetProc get_proc,
+                                                                 void* user) {
   GLint profile = 0;
   GLint flags = 0;
   gl.GetIntegerv(GL_CONTEXT_PROFILE_MASK, &profile);

@@ -4,13 +4,13 @@
 
 #include <memory>
 
+#include "gl/proc_address.hpp"
+
 namespace cumulet::gl {
 
 /// The functions that only a compatibility context has, as far as the library needs them. They are loaded through the
 /// host's callback.
 struct CompatibilityFunctions {
-  using GetProc = void* (*)(void* user, const char* name);
-
   void(GLAD_API_PTR* PixelTransferf)(GLenum name, GLfloat value) = nullptr;
   void(GLAD_API_PTR* TexEnvf)(GLenum target, GLenum name, GLfloat value) = nullptr;
   void(GLAD_API_PTR* GetTexEnvfv)(GLenum target, GLenum name, GLfloat* values) = nullptr;
@@ -22,12 +22,11 @@ struct CompatibilityFunctions {
 };
 
 /// Returns null in a core or forward-compatible context. Throws Error(unsupported) with the name of a missing function.
-std::shared_ptr<const CompatibilityFunctions> load_compatibility(const GladGLContext& gl,
-                                                                 CompatibilityFunctions::GetProc get_proc, void* user);
+std::shared_ptr<const CompatibilityFunctions> load_compatibility(const GladGLContext& gl, GetProc get_proc, void* user);
 
 /// Returns the window system's query for the current context. Null if the host's callback provides none that returns a
 /// context.
-void* (*find_current_context(CompatibilityFunctions::GetProc get_proc, void* user))();
+void* (*find_current_context(GetProc get_proc, void* user))();
 
 inline constexpr const char* between_begin_and_end_message =
     "the function was called between glBegin and glEnd, which OpenGL does not allow: call it after glEnd";

@@ -72,9 +72,4 @@ struct GltfFile {
 GltfFile parse_gltf(std::vector<std::uint8_t> bytes, const std::optional<std::filesystem::path>& folder, const Log& log,
                     const std::string& name, Budget& budget, Progress* progress);
 
-/// Decompresses one buffer view of EXT_meshopt_compression. `owner` keeps the bytes in `from` alive. Throws
-/// Error(file).
-std::vector<std::uint8_t> decode_meshopt(const tinygltf::Value& extension, std::span<const std::uint8_t> from,
-                                         const Owner& owner, const std::string& what, Budget& budget);
-
 }  // namespace cumulet::surface::detail

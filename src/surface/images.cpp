@@ -1,5 +1,3 @@
-#include <webp/decode.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -8,6 +6,7 @@
 #include "base/detached_work.hpp"
 #include "surface/jpeg.h"
 #include "surface/materials.hpp"
+#include "surface/webp.hpp"
 
 namespace cumulet::surface::detail {
 
@@ -59,39 +58,21 @@ bool is_webp(Bytes bytes) {
          std::memcmp(&bytes[form], "WEBP", 4) == 0;
 }
 
-/// A uniform image takes a few bytes at any size, so only the budget limits it.
-Header webp_header(Bytes bytes) {
-  WebPBitstreamFeatures features{};
-  const VP8StatusCode status = WebPGetFeatures(bytes.data(), bytes.size(), &features);
-  if (status == VP8_STATUS_NOT_ENOUGH_DATA) malformed("is a truncated WebP");
-  if (status != VP8_STATUS_OK) malformed("is a malformed WebP");
-  if (features.has_animation != 0) malformed("is an animated WebP, which is not supported");
-  return {static_cast<std::uint64_t>(features.width), static_cast<std::uint64_t>(features.height), 0};
-}
-
 Header read_header(std::span<const std::uint8_t> bytes) {
   if (bytes.size() >= png_signature.size() && std::equal(png_signature.begin(), png_signature.end(), bytes.begin())) {
     return png_header(bytes);
   }
   if (is_jpeg(bytes)) return jpeg_header(bytes);
-  if (is_webp(bytes)) return webp_header(bytes);
+  if (is_webp(bytes)) {
+    // A uniform image takes a few bytes at any size, so only the budget limits it.
+    const WebpSize size = read_webp_size(bytes);
+    return {size.width, size.height, 0};
+  }
   constexpr std::array<std::uint8_t, 4> ktx2 = {0xAB, 'K', 'T', 'X'};
   if (bytes.size() >= ktx2.size() && std::equal(ktx2.begin(), ktx2.end(), bytes.begin())) {
     malformed("is a KTX2 image, which is not supported");
   }
   malformed("is neither PNG, JPEG nor WebP");
-}
-
-Image decode_webp(Bytes bytes, const Header& header) {
-  Image result;
-  result.width = static_cast<std::uint32_t>(header.width);
-  result.height = static_cast<std::uint32_t>(header.height);
-  result.rgba.resize(std::size_t{result.width} * result.height * 4);
-  if (WebPDecodeRGBAInto(bytes.data(), bytes.size(), result.rgba.data(), result.rgba.size(),
-                         static_cast<int>(4 * result.width)) == nullptr) {
-    malformed("cannot be decoded");
-  }
-  return result;
 }
 
 DecodedImage decode_jpeg(Bytes bytes, const Header& header) {
@@ -155,7 +136,7 @@ DecodedImage decode_image(Bytes bytes, const Owner& owner, Budget& budget) {
   budget.take(pixels, 4, "an image of " + size);
   return run_cancellable(budget.progress_for(4 * pixels), [bytes, owner, header] {
     if (is_jpeg(bytes)) return decode_jpeg(bytes, header);
-    return DecodedImage{is_webp(bytes) ? decode_webp(bytes, header) : decode_png(bytes), {}};
+    return DecodedImage{is_webp(bytes) ? decode_webp(bytes, {header.width, header.height}) : decode_png(bytes), {}};
   });
 }
 

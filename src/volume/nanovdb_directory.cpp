@@ -17,18 +17,16 @@ namespace {
 using nanovdb::io::Codec;
 
 // The last character of the magic number is 0 up to NanoVDB 32.7; later it is 1 for grids and 2 for files.
-constexpr std::uint64_t magic_of_both = NANOVDB_MAGIC_NUMBER;  // "NanoVDB0"
-constexpr std::uint64_t magic_of_grids = 0x314244566f6e614e;   // "NanoVDB1"
-constexpr std::uint64_t magic_of_files = 0x324244566f6e614e;   // "NanoVDB2"
+constexpr std::uint64_t magic_of_both = 0x304244566f6e614e;   // "NanoVDB0"
+constexpr std::uint64_t magic_of_grids = 0x314244566f6e614e;  // "NanoVDB1"
+constexpr std::uint64_t magic_of_files = 0x324244566f6e614e;  // "NanoVDB2"
 bool is_known(std::uint64_t magic) {
   return magic == magic_of_both || magic == magic_of_grids || magic == magic_of_files;
 }
 
 constexpr std::uint32_t known_minor = 9;  // NanoVDB 32.9, of OpenVDB 13
-constexpr std::uint64_t head_bytes = sizeof(nanovdb::GridData) + sizeof(nanovdb::TreeData<>);
+constexpr std::uint64_t head_bytes = sizeof(nanovdb::GridData) + sizeof(NanoTreeData);
 constexpr std::uint32_t name_class = 3;  // GridBlindDataClass::GridName
-
-static_assert(sizeof(nanovdb::GridData) == 672 && sizeof(nanovdb::TreeData<>) == 64);
 
 std::string text_of(const nanovdb::Version& version) {
   return std::to_string(version.getMajor()) + "." + std::to_string(version.getMinor()) + "." +
@@ -122,9 +120,9 @@ class DirectoryReader {
   /// Checks the version, which follows the checksum in a grid, but comes first in a segment.
   bool looks_like(Part part, std::uint64_t position) {
     if (part == Part::segment) {
-      if (size_ - position < sizeof(nanovdb::io::Header)) return false;
-      const auto header = read_value<nanovdb::io::Header>(position);
-      return is_likely(header.version) && header.codec < Codec::END;
+      if (size_ - position < sizeof(NanoFileHeader)) return false;
+      const auto header = read_value<NanoFileHeader>(position);
+      return is_likely(header.version) && header.codec <= Codec::BLOSC;
     }
     if (size_ - position < head_bytes) return false;
     const auto grid = read_value<nanovdb::GridData>(position);
@@ -171,13 +169,13 @@ class DirectoryReader {
 
   /// Lists the grids of the segment at this position. Returns the position of the next part.
   std::uint64_t read_segment(std::uint64_t position) {
-    const auto header = read_value<nanovdb::io::Header>(position);
+    const auto header = read_value<NanoFileHeader>(position);
     take_version(header.version);
-    if (header.codec >= Codec::END) fail("the file is damaged: unknown compression");
+    if (header.codec > Codec::BLOSC) fail("the file is damaged: unknown compression");
     position += sizeof header;
     const std::size_t first = out_.locations.size();
     for (int i = 0; i < header.gridCount; ++i) {
-      const auto meta = read_value<nanovdb::io::MetaData>(position);
+      const auto meta = read_value<NanoFileMetaData>(position);
       position += sizeof meta;
       std::string name(std::min<std::uint64_t>(meta.nameSize, size_), '\0');
       read_bytes(position, name.data(), meta.nameSize);
@@ -207,18 +205,17 @@ class DirectoryReader {
 
   /// Names of more than 255 characters are in the grid's blind data, all of which is validated.
   std::optional<std::string> long_name(std::uint64_t position, const nanovdb::GridData& grid) {
-    if ((grid.mFlags & static_cast<std::uint32_t>(nanovdb::GridFlags::HasLongGridName)) == 0) return std::nullopt;
-    using Blind = nanovdb::GridBlindMetaData;
+    if ((flags_of(grid) & static_cast<std::uint32_t>(nanovdb::GridFlags::HasLongGridName)) == 0) return std::nullopt;
     const std::uint64_t bytes = grid.mGridSize;
     auto at = static_cast<std::uint64_t>(grid.mBlindMetadataOffset);
-    for (std::uint32_t i = 0; i < grid.mBlindMetadataCount; ++i, at += sizeof(Blind)) {
-      if (at > bytes || sizeof(Blind) > bytes - at) return std::nullopt;
-      const auto blind = read_value<Blind>(position + at);
-      if (static_cast<std::uint32_t>(blind.mDataClass) != name_class) continue;
+    for (std::uint32_t i = 0; i < grid.mBlindMetadataCount; ++i, at += sizeof(NanoBlindData)) {
+      if (at > bytes || sizeof(NanoBlindData) > bytes - at) return std::nullopt;
+      const auto blind = read_value<NanoBlindData>(position + at);
+      if (blind.data_class != name_class) continue;
       // Relative to the entry itself, in all versions that write grid buffers.
-      const std::uint64_t start = at + static_cast<std::uint64_t>(blind.mByteOffset);
-      if (start > bytes || blind.mElementCount > bytes - start) return std::nullopt;
-      std::string name(blind.mElementCount, '\0');
+      const std::uint64_t start = at + static_cast<std::uint64_t>(blind.data_offset);
+      if (start > bytes || blind.value_count > bytes - start) return std::nullopt;
+      std::string name(blind.value_count, '\0');
       read_bytes(position + start, name.data(), name.size());
       return name.substr(0, name.find('\0'));
     }
@@ -249,7 +246,7 @@ bool is_nano_grid(const nanovdb::GridData& grid) { return is_known(grid.mMagic);
 
 bool has_right_checksum(const nanovdb::GridData& grid, std::uint64_t root_bytes) {
   constexpr std::uint32_t none = ~std::uint32_t{0};
-  const auto stored = static_cast<std::uint32_t>(grid.mChecksum);
+  const auto stored = static_cast<std::uint32_t>(checksum_of(grid));
   if (stored == none || grid.mVersion.getMinor() > known_minor) return true;
   // Up to 32.6.0 the checksum also covers the root.
   const bool with_root =

@@ -2,13 +2,11 @@
 
 // Private to volume/: the grids in a NanoVDB file, and their positions.
 
-#include <nanovdb/NanoVDB.h>
-#include <nanovdb/util/IO.h>
-
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "volume/nanovdb_version.hpp"
 #include "volume/source_file.hpp"
 #include "volume/volume.hpp"
 

@@ -1,13 +1,11 @@
 #include <blosc.h>
-#include <nanovdb/NanoVDB.h>
-#include <nanovdb/util/GridHandle.h>
-#include <nanovdb/util/HostBuffer.h>
-#include <nanovdb/util/IO.h>
 #include <tbb/parallel_for.h>
 #include <zlib.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
+#include <new>
 
 #include "volume/import_detail.hpp"
 #include "volume/nanovdb_directory.hpp"
@@ -17,7 +15,25 @@ namespace cumulet::volume::detail {
 namespace {
 
 using nanovdb::io::Codec;
-using Handle = nanovdb::GridHandle<nanovdb::HostBuffer>;
+
+/// The bytes of a grid, uninitialized and aligned as NanoVDB requires. NanoVDB's own handle is not used: since OpenVDB
+/// 11 it reads a grid's counts without validation.
+class GridBuffer {
+ public:
+  explicit GridBuffer(std::uint64_t size)
+      : bytes_(static_cast<std::uint8_t*>(operator new(size, alignment))), size_(size) {}
+
+  [[nodiscard]] std::uint8_t* data() const { return bytes_.get(); }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+
+ private:
+  static constexpr std::align_val_t alignment{NANOVDB_DATA_ALIGNMENT};
+  struct Delete {
+    void operator()(std::uint8_t* bytes) const { operator delete(bytes, alignment); }
+  };
+  std::unique_ptr<std::uint8_t, Delete> bytes_;
+  std::uint64_t size_;
+};
 
 glm::ivec3 child_offset(std::uint32_t i, unsigned log2_table, unsigned log2_child) {
   const std::uint32_t mask = (1U << log2_table) - 1U;
@@ -29,7 +45,7 @@ class NanoLeaves final : public HeldLeaves {
  public:
   using LeafT = nanovdb::NanoLeaf<BuildT>;
 
-  NanoLeaves(std::shared_ptr<const Handle> handle, Pick pick) : handle_(std::move(handle)), pick_(pick) {}
+  NanoLeaves(std::shared_ptr<const GridBuffer> buffer, Pick pick) : buffer_(std::move(buffer)), pick_(pick) {}
   void add(const LeafT* leaf, glm::ivec3 origin) {
     leaves_.push_back(leaf);
     origins_.push_back(origin);
@@ -38,10 +54,10 @@ class NanoLeaves final : public HeldLeaves {
   [[nodiscard]] std::size_t count() const override { return leaves_.size(); }
   [[nodiscard]] glm::ivec3 origin(std::size_t leaf) const override { return origins_[leaf]; }
   [[nodiscard]] ActiveMask active(std::size_t leaf) const override {
+    const auto& bits = leaves_[leaf]->data()->mValueMask;  // its words have no accessor in all versions
     ActiveMask mask;
-    for (int x = 0; x < brick_size; ++x) {
-      mask[static_cast<std::size_t>(x)] = leaves_[leaf]->data()->mValueMask.template getWord<std::uint64_t>(x);
-    }
+    static_assert(sizeof mask == sizeof bits);
+    std::memcpy(mask.data(), &bits, sizeof mask);
     return mask;
   }
   void values(std::size_t leaf, float* out) const override {
@@ -50,7 +66,7 @@ class NanoLeaves final : public HeldLeaves {
   }
 
  private:
-  std::shared_ptr<const Handle> handle_;  // owns the memory of the leaves
+  std::shared_ptr<const GridBuffer> buffer_;  // owns the memory of the leaves
   Pick pick_;
   std::vector<const LeafT*> leaves_;
   std::vector<glm::ivec3> origins_;
@@ -67,11 +83,11 @@ class NanoWalk {
   using LowerT = nanovdb::NanoLower<BuildT>;
   using LeafT = nanovdb::NanoLeaf<BuildT>;
 
-  static SourceGrid run(std::shared_ptr<const Handle> handle, const Log& log, const std::string& log_prefix,
+  static SourceGrid run(std::shared_ptr<const GridBuffer> buffer, const Log& log, const std::string& log_prefix,
                         const Progress* progress, Pick pick = {}) {
-    NanoWalk walk(handle->data(), handle->size(), progress, pick);
+    NanoWalk walk(buffer->data(), buffer->size(), progress, pick);
     walk.tree(log, log_prefix);
-    auto leaves = std::make_unique<NanoLeaves<BuildT, Pick>>(std::move(handle), pick);
+    auto leaves = std::make_unique<NanoLeaves<BuildT, Pick>>(std::move(buffer), pick);
     for (const auto& [leaf, origin] : walk.leaves_) leaves->add(leaf, origin);
     walk.out_.leaves = std::move(leaves);
     return std::move(walk.out_);
@@ -211,24 +227,24 @@ class NanoReader final : public Reader {
   [[nodiscard]] double reading() const override { return 0.7; }
 
   SourceGrid read(std::size_t index, Portion portion, const Log& log, const std::string& log_prefix) override {
-    std::shared_ptr<const Handle> handle = load_checked(index, portion);
+    std::shared_ptr<const GridBuffer> buffer = load_checked(index, portion);
     switch (directory_.locations[index].type) {
       case nanovdb::GridType::Float:
-        return NanoWalk<float>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<float>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::Double:
-        return NanoWalk<double>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<double>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::Fp4:
-        return NanoWalk<nanovdb::Fp4>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<nanovdb::Fp4>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::Fp8:
-        return NanoWalk<nanovdb::Fp8>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<nanovdb::Fp8>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::Fp16:
-        return NanoWalk<nanovdb::Fp16>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<nanovdb::Fp16>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::FpN:
-        return NanoWalk<nanovdb::FpN>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<nanovdb::FpN>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::Vec3f:
-        return NanoWalk<nanovdb::Vec3f>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<nanovdb::Vec3f>::run(std::move(buffer), log, log_prefix, progress_);
       case nanovdb::GridType::Vec3d:
-        return NanoWalk<nanovdb::Vec3d>::run(std::move(handle), log, log_prefix, progress_);
+        return NanoWalk<nanovdb::Vec3d>::run(std::move(buffer), log, log_prefix, progress_);
       default:
         fail(unreadable);
     }
@@ -236,13 +252,13 @@ class NanoReader final : public Reader {
 
   std::array<SourceGrid, 3> read_vector(std::size_t index, Portion portion, const Log& log,
                                         const std::string& log_prefix) override {
-    const std::shared_ptr<const Handle> handle = load_checked(index, portion);
+    const std::shared_ptr<const GridBuffer> buffer = load_checked(index, portion);
     const auto components = [&]<typename BuildT>() {
       std::array<SourceGrid, 3> out;
       for (int axis = 0; axis < 3; ++axis) {
         // Problems of the grid are logged once.
         const Log& heard = axis > 0 ? Log() : log;
-        out[axis] = NanoWalk<BuildT, Component>::run(handle, heard, log_prefix, progress_, Component{axis});
+        out[axis] = NanoWalk<BuildT, Component>::run(buffer, heard, log_prefix, progress_, Component{axis});
       }
       return out;
     };
@@ -260,25 +276,25 @@ class NanoReader final : public Reader {
     stream_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
   }
 
-  std::shared_ptr<const Handle> load_checked(std::size_t index, Portion portion) {
-    auto handle = std::make_shared<const Handle>(load(directory_.locations[index], portion));
-    if (handle->size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
-    const auto* grid = reinterpret_cast<const nanovdb::GridData*>(handle->data());
+  std::shared_ptr<const GridBuffer> load_checked(std::size_t index, Portion portion) {
+    auto buffer = std::make_shared<const GridBuffer>(load(directory_.locations[index], portion));
+    if (buffer->size() < sizeof(nanovdb::GridData)) fail("the file is damaged: grid too small");
+    const auto* grid = reinterpret_cast<const nanovdb::GridData*>(buffer->data());
     if (!is_nano_grid(*grid)) fail("the file is damaged: missing grid");
     if (grid->mGridType != directory_.locations[index].type)
       fail("the file is damaged: grid and directory differ in type");
-    return handle;
+    return buffer;
   }
 
   /// Reads and decodes a grid, validating all sizes. NanoVDB's own reader does not, and cannot be cancelled.
-  Handle load(const NanoLocation& location, Portion portion) {
+  GridBuffer load(const NanoLocation& location, Portion portion) {
     // No codec exceeds zlib's ratio of 1032 to 1: a larger size is rejected before memory is allocated.
     constexpr std::uint64_t max_expansion = 1040;
     if (location.memory_bytes == 0 || location.memory_bytes / max_expansion > location.file_bytes) fail(sizes_differ);
     if (location.codec == Codec::NONE && location.memory_bytes != location.file_bytes) fail(sizes_differ);
     ProgressPart& part = stream_.begin(
         portion.from, portion.to, location.file_bytes + (location.codec == Codec::NONE ? 0 : location.memory_bytes));
-    auto buffer = nanovdb::HostBuffer::create(location.memory_bytes);
+    GridBuffer buffer(location.memory_bytes);
     std::uint64_t position = location.position;
     std::uint64_t rest = location.file_bytes;
     const auto next_frame = [&] {
@@ -311,7 +327,7 @@ class NanoReader final : public Reader {
         rest = 0;
     }
     if (rest != 0) fail(sizes_differ);
-    return {std::move(buffer)};
+    return buffer;
   }
 
   /// Decodes the zlib frame at the stream's position.

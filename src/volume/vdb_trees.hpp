@@ -6,6 +6,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <utility>
+
 // NOLINTBEGIN(bugprone-macro-parentheses)
 #define CUMULET_TREE_OF_LIBRARY(TreeT)                                            \
   extern template bool TreeT::evalLeafBoundingBox(CoordBBox&) const;              \
@@ -17,7 +19,7 @@
   extern template void TreeT::readNonresidentBuffers() const;                     \
   extern template void TreeT::writeBuffers(std::ostream&, bool) const;            \
   extern template void TreeT::print(std::ostream&, int) const;                    \
-  extern template std::vector<Index32> TreeT::nodeCount() const;                  \
+  extern template NodeCounts TreeT::nodeCount() const;                            \
   extern template Index64 TreeT::activeLeafVoxelCount() const;                    \
   extern template Index64 TreeT::inactiveLeafVoxelCount() const;                  \
   extern template Index64 TreeT::activeVoxelCount() const;                        \
@@ -25,10 +27,14 @@
   extern template Index64 TreeT::activeTileCount() const;                         \
   extern template Index64 TreeT::memUsage() const;                                \
   extern template void TreeT::clipUnallocatedNodes();                             \
-  extern template Index32 TreeT::unallocatedLeafCount() const
+  extern template LeafCount TreeT::unallocatedLeafCount() const
 // NOLINTEND(bugprone-macro-parentheses)
 
 namespace openvdb::OPENVDB_VERSION_NAME::tree {
+
+// 32-bit integers up to OpenVDB 11, 64-bit since 12.
+using LeafCount = decltype(std::declval<const FloatTree&>().unallocatedLeafCount());
+using NodeCounts = decltype(std::declval<const FloatTree&>().nodeCount());
 
 CUMULET_TREE_OF_LIBRARY(Tree<FloatTree::RootNodeType>);
 CUMULET_TREE_OF_LIBRARY(Tree<DoubleTree::RootNodeType>);

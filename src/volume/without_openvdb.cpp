@@ -1,0 +1,12 @@
+#include "base/missing_feature.hpp"
+#include "volume/import_detail.hpp"
+
+namespace cumulet::volume {
+
+void initialize_readers() {}
+
+std::unique_ptr<detail::Reader> detail::open_vdb(const std::filesystem::path& /*file*/, Progress* /*progress*/) {
+  fail(missing_feature("is an OpenVDB file", "CUMULET_OPENVDB"));
+}
+
+}  // namespace cumulet::volume
