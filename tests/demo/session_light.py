@@ -76,7 +76,7 @@ def test_lamps(s):
     there = ["frames 3", "wait loaded", "frames 2"]
     # Hides handles and icons, because the images are compared.
     s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', *SETTLE, *shot("point"), 'click "Light 1"', "frames 2",
-                      'click "Light 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.7 0.5', *SETTLE,
+                      'click "Light 1/Spot"', *there, 'report "spot.json"', 'drag "Power 1" 0.5 0.5 to "Power 1" 0.6 0.5', *SETTLE,
                       *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
                       'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), 'click "Remove light 1"',
                       *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"',
