@@ -130,17 +130,17 @@ wait_for() { # FOLDER SECONDS: waits for a volume
 
 # ---- pictures ----
 compare_pictures() {
-  local name limits flags words limit result verdict worst
+  local name limits flags words bounds result verdict worst
   "$programs/bin/cumulet-scene" "$work/scene" --voxels 150000 --frame 12 >>"$log" 2>&1
   while IFS=$'\t' read -r name limits flags; do
     IFS='|' read -ra words <<<"${flags//@SCENE@/$work/scene}"
-    IFS='|' read -ra limit <<<"$limits"
+    IFS='|' read -ra bounds <<<"$limits"
     if ! render "$name" "${words[@]}"; then
       failed picture "$name" "$(tail -n 1 "$log")"
       continue
     fi
     verdict=ok
-    result=$("$programs/bench/cumulet-compare" "$work/$name.exr" "$here/golden/$name.exr" "${limit[@]}") || verdict=DIFFERS
+    result=$("$programs/bench/cumulet-compare" "$work/$name.exr" "$here/golden/$name.exr" "${bounds[@]}") || verdict=DIFFERS
     [ "$verdict" = ok ] || failures=$((failures + 1))
     worst=${result#*worst block }
     row picture "$name" "" "${worst%% *}" % \
