@@ -142,6 +142,9 @@ TEST_P(Trace, MultipleScatteringAgreesWithAnIndependentPathTracer) {
     const test::TrackedMean expected =
         reference.view(eye, target, fovy, interpolation == grid::Interpolation::linear ? 100000 : 400000);
     for (const test::MarchKind& kind : test::march_kinds) {
+      const bool interpolates = interpolation == grid::Interpolation::linear;
+      const bool is_constant = kind.march == March::tet && kind.cells == grid::CellKind::constant;
+      if (interpolates && is_constant) continue;  // sixths of cells of constant density are another field
       viewer::GridSettings settings = test::settings_of(kind);
       settings.build.interpolation = interpolation;
       viewer->set_grid(settings);
