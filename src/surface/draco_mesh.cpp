@@ -12,10 +12,6 @@
 
 namespace cumulet::surface::detail {
 
-struct DracoMesh::State {
-  std::unique_ptr<draco::Mesh> mesh;
-};
-
 namespace {
 
 /// Returns the number of triangles in the stream's header, which the decoder would allocate.
@@ -60,10 +56,57 @@ double largest(draco::DataType type) {
   }
 }
 
+class DecodedMesh final : public DracoMesh {
+ public:
+  DecodedMesh(std::unique_ptr<draco::Mesh> mesh, const Budget& budget) : mesh_(std::move(mesh)), budget_(budget) {}
+
+  [[nodiscard]] std::size_t vertex_count() const override { return mesh_->num_points(); }
+
+  [[nodiscard]] std::vector<std::uint32_t> indices() const override {
+    std::vector<std::uint32_t> result;
+    result.reserve(std::size_t{mesh_->num_faces()} * 3);
+    for (std::uint32_t f = 0; f < mesh_->num_faces(); ++f) {
+      budget_.check(f);
+      for (const draco::PointIndex& point : mesh_->face(draco::FaceIndex(f))) result.push_back(point.value());
+    }
+    return result;
+  }
+
+  void read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
+            float* to, std::size_t step, const std::string& what) const override {
+    draco::Mesh& mesh = *mesh_;
+    const int attribute_id = mesh.GetAttributeIdByUniqueId(id);
+    if (attribute_id < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
+    draco::PointAttribute* attribute = mesh.attribute(attribute_id);
+    if (!attribute->is_mapping_identity() && attribute->indices_map_size() < mesh.num_points()) {
+      malformed(what + " has fewer elements than vertices");
+    }
+    if (attribute->num_components() < components) malformed(what + " has the wrong type of element");
+    // Draco's own flag may differ from the accessor's.
+    attribute->set_normalized(false);
+    const double divisor = normalized ? largest(attribute->data_type()) : 1.0;
+    std::vector<float> element(attribute->num_components());
+    for (std::size_t n = 0; n < which.size(); ++n) {
+      budget_.check(n);
+      const draco::AttributeValueIndex index = attribute->mapped_index(draco::PointIndex(which[n]));
+      if (index.value() >= attribute->size() ||
+          !attribute->ConvertValue(index, static_cast<std::int8_t>(element.size()), element.data())) {
+        malformed(what + " has fewer elements than vertices");
+      }
+      for (std::size_t c = 0; c < components; ++c) {
+        to[n * step + c] = divisor == 1.0 ? element[c] : static_cast<float>(std::max(element[c] / divisor, -1.0));
+      }
+    }
+  }
+
+ private:
+  std::unique_ptr<draco::Mesh> mesh_;
+  const Budget& budget_;
+};
+
 }  // namespace
 
-DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, Budget& budget)
-    : state_(std::make_unique<State>()), budget_(budget) {
+std::unique_ptr<DracoMesh> decode_draco(Bytes bytes, const Owner& owner, const std::string& what, Budget& budget) {
   const std::uint64_t faces = face_count(bytes, what);
   // This is far above the compression ratio of regular meshes.
   if (faces > bytes.size() * 1024) {
@@ -72,7 +115,7 @@ DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, B
   }
   constexpr std::uint64_t bytes_per_face = 256;  // of the decoder's tables
   budget.take(faces, bytes_per_face, what);
-  state_->mesh = run_cancellable(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
+  auto mesh = run_cancellable(budget.progress_for(faces * bytes_per_face), [bytes, owner, what] {
     draco::DecoderBuffer buffer;
     buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     draco::Decoder decoder;
@@ -83,47 +126,7 @@ DracoMesh::DracoMesh(Bytes bytes, const Owner& owner, const std::string& what, B
     }
     return std::move(decoded).value();
   });
-}
-
-DracoMesh::~DracoMesh() = default;
-
-std::size_t DracoMesh::vertex_count() const { return state_->mesh->num_points(); }
-
-std::vector<std::uint32_t> DracoMesh::indices() const {
-  std::vector<std::uint32_t> result;
-  result.reserve(std::size_t{state_->mesh->num_faces()} * 3);
-  for (std::uint32_t f = 0; f < state_->mesh->num_faces(); ++f) {
-    budget_.check(f);
-    for (const draco::PointIndex& point : state_->mesh->face(draco::FaceIndex(f))) result.push_back(point.value());
-  }
-  return result;
-}
-
-void DracoMesh::read(std::uint32_t id, std::size_t components, bool normalized, const std::vector<std::uint32_t>& which,
-                     float* to, std::size_t step, const std::string& what) const {
-  draco::Mesh& mesh = *state_->mesh;
-  const int attribute_id = mesh.GetAttributeIdByUniqueId(id);
-  if (attribute_id < 0) malformed(what + ": there is no Draco attribute " + std::to_string(id));
-  draco::PointAttribute* attribute = mesh.attribute(attribute_id);
-  if (!attribute->is_mapping_identity() && attribute->indices_map_size() < mesh.num_points()) {
-    malformed(what + " has fewer elements than vertices");
-  }
-  if (attribute->num_components() < components) malformed(what + " has the wrong type of element");
-  // Draco's own flag may differ from the accessor's.
-  attribute->set_normalized(false);
-  const double divisor = normalized ? largest(attribute->data_type()) : 1.0;
-  std::vector<float> element(attribute->num_components());
-  for (std::size_t n = 0; n < which.size(); ++n) {
-    budget_.check(n);
-    const draco::AttributeValueIndex index = attribute->mapped_index(draco::PointIndex(which[n]));
-    if (index.value() >= attribute->size() ||
-        !attribute->ConvertValue(index, static_cast<std::int8_t>(element.size()), element.data())) {
-      malformed(what + " has fewer elements than vertices");
-    }
-    for (std::size_t c = 0; c < components; ++c) {
-      to[n * step + c] = divisor == 1.0 ? element[c] : static_cast<float>(std::max(element[c] / divisor, -1.0));
-    }
-  }
+  return std::make_unique<DecodedMesh>(std::move(mesh), budget);
 }
 
 }  // namespace cumulet::surface::detail

@@ -127,7 +127,7 @@ class Primitive {
       malformed(what_ + ": KHR_draco_mesh_compression is malformed");
     }
     const auto compressed = naming(what_, [&] { return file_.view(extension.Get("bufferView").GetNumberAsInt()); });
-    draco_ = std::make_unique<DracoMesh>(compressed, file_.storage, what_, budget_);
+    draco_ = decode_draco(compressed, file_.storage, what_, budget_);
     for (const auto& [name, id] : extension.Get("attributes").Get<tinygltf::Value::Object>()) {
       draco_ids_[name] = static_cast<std::uint32_t>(id.GetNumberAsInt());
     }

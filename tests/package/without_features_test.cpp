@@ -29,7 +29,7 @@ TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
             "is an OpenVDB file, which this build of Cumulet does not read (CUMULET_OPENVDB=OFF)");
   EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_nanovdb("cloud.nvdb", nullptr); }),
             "is a NanoVDB file, which this build of Cumulet does not read (CUMULET_NANOVDB=OFF)");
-  EXPECT_EQ(error_of([&] { const DracoMesh mesh({}, nullptr, "mesh 0", budget); }),
+  EXPECT_EQ(error_of([&] { (void)decode_draco({}, nullptr, "mesh 0", budget); }),
             "mesh 0 is compressed by Draco, which this build of Cumulet does not read (CUMULET_DRACO=OFF)");
   EXPECT_EQ(error_of([&] { (void)decode_meshopt({}, {}, nullptr, "buffer view 1", budget); }),
             "buffer view 1 is compressed by meshoptimizer, which this build of Cumulet does not read "
