@@ -33,6 +33,7 @@ const std::vector<Shortcut>& shortcuts() {
   constexpr unsigned ctrl = modifier_ctrl;
   constexpr unsigned shift = modifier_shift;
   static const std::vector<Shortcut> all = {
+      {GLFW_KEY_N, ctrl, {Action::new_scene}, "Ctrl+N", "New scene"},
       {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
       {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
@@ -229,6 +230,13 @@ std::string main_file(const SceneOptions& scene) {
   if (!scene.surfaces.empty()) return scene.surfaces;
   if (!scene.others.empty()) return scene.others.front().volume;
   return scene.models.empty() ? scene.environment : scene.models.front().file;
+}
+
+std::string scene_name(const Model& model) {
+  const std::string& file = model.scene_path.empty() ? main_file(model.scene) : model.scene_path;
+  const std::string name = fs::path(file).filename().string();
+  if (!model.modified) return name;
+  return "*" + (name.empty() ? "Untitled" : name);
 }
 
 std::string suggest_path(const Model& model, const std::string& ending) {

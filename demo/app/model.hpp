@@ -22,6 +22,7 @@ namespace cumulet::demo {
 
 /// User commands other than changes of settings.
 enum class Action {
+  new_scene,
   open_dialog,
   open,  // text: a file of any kind
   add_volume_dialog,
@@ -32,7 +33,10 @@ enum class Action {
   clear_environment,
   save_scene,
   save_scene_dialog,
-  save_scene_as,  // text: the file
+  save_scene_as,    // text: the file
+  discard_changes,  // then carries out the commands that wait for the user's answer
+  recover,          // opens the scene that an ended process has left
+  discard_recovery,
   png_dialog,
   save_png,  // text: the file
   exr_dialog,
@@ -206,6 +210,7 @@ struct Model {
   bool can_undo = false;
   bool can_redo = false;
   std::string scene_path;  // scene file that was opened or saved last
+  bool modified = false;   // the scene has unsaved changes
   std::vector<GridInfo> grids;
   Status status;
   unsigned thumbnail_texture = 0;  // OpenGL name of status.thumbnail in the window's context; 0: none
@@ -241,6 +246,10 @@ struct Work {
 
 /// Returns the file that a scene is named after: the volume's, or the first other file in the scene.
 [[nodiscard]] std::string main_file(const SceneOptions& scene);
+
+/// Returns the name of the scene: that of its scene file, or else of its main file; "" for an empty scene. An asterisk
+/// at the front marks unsaved changes.
+[[nodiscard]] std::string scene_name(const Model& model);
 
 /// Suggests a path for a new file: the main file's name, a free number and the extension, in the last used folder.
 [[nodiscard]] std::string suggest_path(const Model& model, const std::string& ending);

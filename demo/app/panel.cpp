@@ -60,6 +60,7 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   help_was_closed_ = !model.help;
   dialog_.draw(ui_, model.preferences, commands);
   picker_.draw(ui_, commands);
+  question_.draw(ui_, commands);
 }
 
 void Panel::side(Model& model, std::vector<Command>& commands) {

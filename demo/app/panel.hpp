@@ -9,6 +9,7 @@
 #include "file_dialog.hpp"
 #include "grid_picker.hpp"
 #include "model.hpp"
+#include "question.hpp"
 #include "ramp_edit.hpp"
 #include "rows.hpp"
 #include "ui.hpp"
@@ -27,8 +28,10 @@ class Panel {
   void focus() { focus_ = true; }
   [[nodiscard]] FileDialog& dialog() { return dialog_; }
   /// Returns true if a modal dialog is open.
-  [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open(); }
+  [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open() || question_.is_open(); }
   [[nodiscard]] GridPicker& picker() { return picker_; }
+  [[nodiscard]] Question& question() { return question_; }
+  [[nodiscard]] const Question& question() const { return question_; }
   [[nodiscard]] Ui& ui() { return ui_; }
   /// Returns the last drawn text line below the image; "" if there is none.
   [[nodiscard]] const std::string& state() const { return state_; }
@@ -80,6 +83,7 @@ class Panel {
   std::array<RampView, settings::ramps.size()> ramp_views_;
   FileDialog dialog_;
   GridPicker picker_;
+  Question question_;
   bool focus_ = false;
   bool help_was_closed_ = true;
   double time_ = 0.0;

@@ -14,8 +14,10 @@ struct Preferences {
   cumulet_navigation_style style = CUMULET_NAVIGATION_SIMPLE;
   int width = 1440;
   int height = 900;
+  double autosave_seconds = 60.0;  // between two copies of unsaved changes
 
-  /// Puts a file at the top of the recent files and stores its folder.
+  /// Puts a file at the top of the recent files and stores its folder. Scenes do not displace other files, and vice
+  /// versa.
   void remember(const std::string& path);
   /// Removes a file that cannot be opened from the recent files.
   void forget(const std::string& path);
@@ -23,6 +25,8 @@ struct Preferences {
 
 /// Returns $XDG_CONFIG_HOME/cumulet/demo.json, or the same below ~/.config; "" if neither exists.
 [[nodiscard]] std::string preferences_path();
+/// Returns $XDG_STATE_HOME/cumulet, or the same below ~/.local/state; "" if neither exists.
+[[nodiscard]] std::string recovery_folder();
 /// Loads the preferences. A missing or damaged file gives the defaults, never an error.
 [[nodiscard]] Preferences load_preferences(const std::string& path);
 /// Saves the preferences; does nothing if path is "". Throws std::runtime_error, one line with the path and the cause.

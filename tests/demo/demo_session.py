@@ -32,7 +32,7 @@ class Session:
     def __init__(self, demo, render, scene, out):
         self.demo, self.renderer, self.scene, self.out = demo, render, scene, out
         self.cumulus, self.explosion = f"{scene}/cumulus.vdb", f"{scene}/explosion_0012.vdb"
-        self.environment = dict(os.environ, XDG_CONFIG_HOME=str(out / "config"))
+        self.environment = dict(os.environ, XDG_CONFIG_HOME=str(out / "config"), XDG_STATE_HOME=str(out / "state"))
 
     def start(self, arguments, **more):
         return subprocess.run([self.demo, *arguments], cwd=self.out, env=self.environment, timeout=900,

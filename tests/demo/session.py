@@ -16,6 +16,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import session_content
 import session_input
 import session_light
+import session_saving
 import spans
 from demo_session import assert_alike, assert_differ, assert_drawn, look, Session, SETTLE, shot, SIZE
 
@@ -183,7 +184,7 @@ def test_dropped_together(s):
     assert pathlib.Path(frames["volumes"][1]["file"]).name == "explosion_0012.vdb", frames["volumes"]
     saved = s.report("saved")
     assert saved["sequence"]["frame"] == frames["sequence"]["frame"] == 2, "another up axis keeps the frame"
-    assert frames["title"] == "blast_#.vdb - Cumulet" and saved["title"] == "saved.json - Cumulet", saved["title"]
+    assert frames["title"] == "*blast_#.vdb - Cumulet" and saved["title"] == "saved.json - Cumulet", saved["title"]
 
 
 def test_save_whole(s):
@@ -415,7 +416,7 @@ def main():
     try:
         with os.fdopen(read) as display:
             session.environment["DISPLAY"] = ":" + display.readline().strip()
-        tests = {**vars(session_content), **vars(session_input), **vars(session_light), **globals()}
+        tests = {**vars(session_content), **vars(session_input), **vars(session_light), **vars(session_saving), **globals()}
         tests[f"test_{test}"](session)
     finally:
         server.terminate()

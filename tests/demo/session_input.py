@@ -12,7 +12,7 @@ def test_keyboard(s):
                       "key escape", "frames 2", "key 4", "key m", "frames 3", "wait loaded", *shot("keys"), "key t",
                       "frames 20", *shot("turning"), "key t", "key g", "frames 2", "press w", "frames 10", "release w",
                       "frames 2", *shot("flown"), "key g", "key right", "key right", "frames 2", *shot("turned"),
-                      "key f2", "frames 2", "press tab", "release tab", "frames 2", *shot("panel"), "key ctrl+q", "frames 50",
+                      "key f2", "frames 2", "press tab", "release tab", "frames 2", *shot("panel"), "key ctrl+q", "frames 2", 'click "Question/Discard"', "frames 50",
                       'screenshot "never.png"'])
     for name in ("dialog", "help"):
         assert_differ(s.picture(name), s.picture("loaded"), look(s, name)[2])
