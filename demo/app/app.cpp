@@ -142,8 +142,8 @@ void App::frame() {
   image_->follow_pointer();
   if (model_.chosen && !transform_of(model_.scene, *model_.chosen)) model_.chosen.reset();
 
-  model_.can_undo = history_->can_undo(model_.scene);
-  model_.can_redo = history_->can_redo();
+  model_.undo = history_->undo_name(model_.scene);
+  model_.redo = history_->redo_name();
   last_state_ = panel_.state();
   take_thumbnail();
   std::vector<Command> commands;

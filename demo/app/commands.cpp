@@ -111,6 +111,9 @@ struct App::Commands {
          app.model_.panel = true;
          app.panel_.focus();
        }},
+      {Action::duplicate_selected, [](App& app, const Command&) { duplicate_selected(app.model_); }},
+      {Action::remove_selected, [](App& app, const Command&) { remove_selected(app.model_); }},
+      {Action::add_light, [](App& app, const Command&) { add_light(app.model_); }},
       {Action::toggle_help, [](App& app, const Command&) { app.model_.help = !app.model_.help; }},
       {Action::toggle_fly,
        [](App& app, const Command&) {
@@ -256,6 +259,7 @@ void App::open(const std::string& path) {
     model_.scene.sequence.last.reset();
     model_.scene.sequence.frame.reset();
     model_.scene.visible = true;
+    model_.subject.reset();
     loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
   }
   // A file that is only viewed needs no saving.

@@ -68,6 +68,8 @@ Preferences load_preferences(const std::string& path) {
     for (const auto& choice : settings::navigation_choices)
       if (style == choice.name) preferences.style = static_cast<cumulet_navigation_style>(choice.value);
     preferences.width = std::clamp(json.value("width", preferences.width), min_side, max_side);
+    preferences.panel_width =
+        std::clamp(json.value("panel_width", preferences.panel_width), min_panel_width, max_panel_width);
     preferences.autosave_seconds =
         std::clamp(json.value("autosave_seconds", preferences.autosave_seconds), min_autosave, max_autosave);
     preferences.height = std::clamp(json.value("height", preferences.height), min_side, max_side);
@@ -85,6 +87,7 @@ void save_preferences(const Preferences& preferences, const std::string& path) {
     if (choice.value == preferences.style) json["navigation"] = choice.name;
   json["width"] = preferences.width;
   json["height"] = preferences.height;
+  json["panel_width"] = preferences.panel_width;
   json["autosave_seconds"] = preferences.autosave_seconds;
   std::error_code error;
   fs::create_directories(fs::path(path).parent_path(), error);

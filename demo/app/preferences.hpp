@@ -7,6 +7,9 @@
 
 namespace cumulet::demo {
 
+inline constexpr float min_panel_width = 280.0f;
+inline constexpr float max_panel_width = 480.0f;
+
 /// Settings that the demo stores between runs.
 struct Preferences {
   std::vector<std::string> recent;  // absolute paths, newest first
@@ -14,6 +17,7 @@ struct Preferences {
   cumulet_navigation_style style = CUMULET_NAVIGATION_SIMPLE;
   int width = 1440;
   int height = 900;
+  float panel_width = 372.0f;      // at user interface scale 1
   double autosave_seconds = 60.0;  // between two copies of unsaved changes
 
   /// Puts a file at the top of the recent files and stores its folder. Scenes do not displace other files, and vice

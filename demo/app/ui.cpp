@@ -411,9 +411,7 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
     move_point(points, *view.held, area.point_at(mouse));
     changed = true;
   }
-  const bool removes =
-      ImGui::IsMouseClicked(ImGuiMouseButton_Right) || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Delete), false);
-  if (near && !view.held && removes && remove_point(points, *near)) {
+  if (near && !view.held && ImGui::IsMouseClicked(ImGuiMouseButton_Right) && remove_point(points, *near)) {
     view.chosen = std::min(view.chosen, points.size() - 1);
     near.reset();
     changed = true;

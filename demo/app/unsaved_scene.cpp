@@ -42,6 +42,7 @@ void App::show(SceneOptions scene, const std::string& path) {
   model_.scene = std::move(scene);
   model_.scene_path = path;
   model_.chosen.reset();
+  model_.subject.reset();
   loading_.reload = true;
   loading_.fit = needs_fit(model_.scene.camera);
   changes_->reset();

@@ -113,4 +113,13 @@ def assert_drawn(picture, area):
     assert max(lights) - min(lights) > 25, "the picture is blank"
 
 
+def shown(name, control="Scene/"):
+    """Returns the commands that show a part or object in the inspector, or one of its tabs."""
+    return [f'click "{control}{name}"', "frames 2"]
+
+
+def tab(name):
+    return shown(name, "")
+
+
 SETTLE = ["frames 3", "wait loaded", "wait converged"]
