@@ -373,7 +373,8 @@ bool App::draw() {
     behind.AddCallback(cover, gl_.get());
     behind.AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
     behind.AddCallback(ImDrawCallback_ResetRenderState, nullptr);
-    image_->draw_handles();
+    // The image still shows the previous objects while a file is loading.
+    if (!exchange_.waiting()) image_->draw_handles();
   }
   image_->draw_region();
   // During a drag there may be 60 changes per second, and with software drivers drawing the window costs as much as an

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <info.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -254,7 +255,10 @@ void App::open(const std::string& path) {
   } else if (is_environment(path)) {
     model_.scene.environment = loading_.environment = path;
   } else {
-    set_volume(model_.scene, {.volume = path});
+    const UpAxis up = known_up_axis(path);
+    set_volume(model_.scene, {.volume = path, .up = up});
+    if (up == UpAxis::z)
+      show_message(model_, false, path + ": Z is up, as its metadata says. Edit, Up axis Y changes that", now_);
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();
     model_.scene.sequence.frame.reset();

@@ -391,7 +391,7 @@ void Panel::statistics(const Model& model) {
            print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));
   ui_.plot("Samples per second", "Completed camera paths per second.", charts.samples_per_second.values(),
            short_count(static_cast<double>(charts.samples_per_second.latest())) + "/s");
-  ui_.plot("Noise", "Relative standard error of the image, measured once per second while it refines.",
+  ui_.plot("Noise", "Relative standard error of the samples, before denoising, measured once per second.",
            charts.noise_percent.values(), status.noise ? print("%.2f %%", 100.0 * *status.noise) : std::string("-"));
   ui_.plot("GPU time", "GPU milliseconds of the library's passes per frame.", charts.device_ms.values(),
            print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
@@ -498,18 +498,24 @@ void Panel::state_line(const Model& model) {
   if (converged) text = print("%u samples", model.scene.sampling.samples);
   if (model.scene.sampling.noise_target_percent > 0.0f && status.frame.width > 0) {
     // With a noise target, the number of samples is only a maximum.
-    const double pixels = double(status.frame.width) * status.frame.height;
-    text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / pixels));
+    const double all = double(status.frame.width) * status.frame.height;
+    text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / all));
     if (!converged) text += print(" (%.0f %%)", std::floor(100.0 * part));
   }
   const cumulet_view_mode shown = model.scene.sampling.view;
   for (const auto& view : settings::view_choices)
     if (view.value == shown && shown != CUMULET_VIEW_SHADED) text = view.name;
-  if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0)
-    text += print("   preview %ux%u", status.frame.width, status.frame.height);
-  else
-    text += print("   %ux%u", status.frame.width, status.frame.height);
-  if (status.noise) text += print("   noise %.2f %%", 100.0 * *status.noise);
+  // During a preview the image has no samples of its size.
+  if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0) text = "Preview";
+  text += print("   %ux%u", status.frame.width, status.frame.height);
+  // The noise is that of the samples, which the denoised image does not show. Few samples do not tell it.
+  constexpr double min_noise_samples = 4.0;
+  const double pixels = double(status.frame.width) * status.frame.height;
+  const bool is_shaded = shown == CUMULET_VIEW_SHADED;
+  if (is_shaded && model.scene.display.denoise != CUMULET_DENOISE_OFF)
+    text += "   denoised";
+  else if (status.noise && static_cast<double>(status.stats.samples) >= min_noise_samples * pixels)
+    text += print("   noise %.2f %%", 100.0 * *status.noise);
   if (model.navigation.fly != 0) text += "   flying";
   if (!status.saving.empty()) text += "   saving " + file_name(status.saving) + " when all pixels are sampled";
   state_ = text;
