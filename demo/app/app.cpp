@@ -110,7 +110,9 @@ double App::patience() const {
 
 void App::frame() {
   const double before = std::exchange(now_, glfwGetTime());
-  const auto scale = static_cast<float>(options_.ui_scale > 0.0 ? options_.ui_scale : window_->content_scale());
+  const int percent = model_.preferences.scale_percent;
+  const double chosen = percent > 0 ? 0.01 * percent : window_->content_scale();
+  const auto scale = static_cast<float>(options_.ui_scale > 0.0 ? options_.ui_scale : chosen);
   if (scale != ui_scale_) Window::set_ui_scale(scale);
   ui_scale_ = scale;
   take();

@@ -116,6 +116,8 @@ struct App::Commands {
       {Action::remove_selected, [](App& app, const Command&) { remove_selected(app.model_); }},
       {Action::add_light, [](App& app, const Command&) { add_light(app.model_); }},
       {Action::toggle_help, [](App& app, const Command&) { app.model_.help = !app.model_.help; }},
+      {Action::scale_interface,
+       [](App& app, const Command& command) { app.model_.preferences.scale_percent = command.value; }},
       {Action::toggle_fly,
        [](App& app, const Command&) {
          auto& fly = app.model_.navigation.fly;

@@ -22,6 +22,14 @@ bool is_view(const Model& model) {
   return model.scene.sampling.view == view;
 }
 
+template <int percent>
+MenuEntry scale_entry(const char* label) {
+  return {
+      label, {Action::scale_interface, "", percent}, "Size of texts and controls.", nullptr, [](const Model& model) {
+        return model.preferences.scale_percent == percent;
+      }};
+}
+
 const MenuEntry separator = {"", {Action::cancel}, ""};
 
 template <Tool tool>
@@ -122,6 +130,11 @@ Menu view_menu() {
             "Shows or hides the panel.",
             nullptr,
             [](const Model& model) { return model.panel; }},
+           scale_entry<0>("Scale of the screen"),
+           scale_entry<100>("Scale 100 %"),
+           scale_entry<125>("Scale 125 %"),
+           scale_entry<150>("Scale 150 %"),
+           scale_entry<200>("Scale 200 %"),
            {"Keyboard to panel", {Action::focus_panel}, "Moves the keyboard focus to the panel."},
            {"Dismiss message", {Action::dismiss}, "Hides the newest message.", [](const Model& model) {
               return !model.messages.empty();

@@ -53,6 +53,7 @@ enum class Action {
   remove_selected,
   add_light,
   toggle_help,
+  scale_interface,  // value: percent; 0: as the screen
   toggle_fly,
   toggle_turntable,
   tool,         // value: a Tool

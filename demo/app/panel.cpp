@@ -77,7 +77,7 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   ImGui::SetNextWindowSize({screen.x - left, screen.y - top});
   if (focus_) ImGui::SetNextWindowFocus();
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
-  ImGui::Begin("Settings", nullptr,
+  ImGui::Begin(panel_name, nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing);
   ImGui::PopStyleVar();

@@ -12,6 +12,7 @@
 #include "menus.hpp"
 #include "model.hpp"
 #include "panel.hpp"
+#include "rows.hpp"
 
 namespace {
 
@@ -241,6 +242,25 @@ TEST_P(PanelTest, OutlinerSelectsHidesAndDeletes) {
   click("Eye/Volume 1");
   EXPECT_FALSE(model_.scene.visible);
   EXPECT_EQ(subject_of(model_), Subject(Part::sun_sky)) << "an eye selects nothing";
+}
+
+TEST_P(PanelTest, RightClickResetsASetting) {
+  select(model_, Part::render);
+  panel_.ui().bring_into_view("Exposure");
+  for (int i = 0; i < 4; ++i) frame();
+  model_.scene.display.exposure_stops = 2.0f;
+  click("Exposure", ImGuiMouseButton_Right);
+  EXPECT_EQ(model_.scene.display.exposure_stops, 0.0f);
+  select(model_, Part::sun_sky);
+  panel_.ui().bring_into_view("Turbidity");
+  for (int i = 0; i < 4; ++i) frame();
+  model_.scene.light.sky = CUMULET_SKY_PHYSICAL;
+  model_.scene.light.turbidity = 9.0f;
+  frame();
+  panel_.ui().bring_into_view("Turbidity");
+  for (int i = 0; i < 4; ++i) frame();
+  click("Turbidity", ImGuiMouseButton_Right);
+  EXPECT_EQ(model_.scene.light.turbidity, default_of<cumulet_sun_sky_desc>().turbidity);
 }
 
 TEST_P(PanelTest, EdgeChangesTheWidth) {

@@ -27,22 +27,26 @@ def test_keyboard(s):
 
 
 def test_outliner(s):
-    """The outliner duplicates and deletes objects, each as one step. The edge of the panel sets its width."""
+    """The outliner duplicates and deletes objects, each as one step. A right click resets a setting, and the edge of
+    the panel sets its width."""
     there = ["frames 2", "wait loaded", "frames 2"]
     s.play("replay", ["wait loaded", *shown("Render"), 'drag "Exposure" to "Exposure" 0.7 0.5', *there, 'report "exposed.json"',
-                      'report "again.json"',
+                      'click "Exposure" right', *there, 'report "reset.json"', "key ctrl+z", *there, 'report "again.json"',
                       *shown("Volume 1"), "key ctrl+d", *there, 'report "two.json"', "key delete", *there, 'report "one.json"',
                       "key ctrl+z", *there, *tab("Edit"), *shot("menu"), 'click "Edit/Undo"', *there, 'report "undone.json"',
+                      *tab("View"), *tab("View/Scale 150 %"), *there, *shot("scaled"),
+                      *tab("View"), *tab("View/Scale 100 %"), *there,
                       'drag "Panel edge" to 700 300', *there, *shot("wide")],
            "--volume", s.cumulus, "--spp", "1", size=["--size", "1100x700"])
     exposure = lambda name: s.report(name)["scene"]["display"]["exposure_stops"]
     steps = lambda name: s.report(name)["undo_steps"]
     volumes = lambda name: len(s.report(name)["volumes"])
-    assert exposure("exposed") > 1
+    assert exposure("exposed") > 1 and exposure("reset") == 0 and steps("reset") == 2
+    assert exposure("again") == exposure("exposed")
     assert [volumes(name) for name in ("again", "two", "one", "undone")] == [1, 2, 1, 1]
     assert [steps(name) for name in ("again", "two", "one", "undone")] == [1, 2, 3, 1]
     width = lambda name: 1100 - s.report(name)["viewport"][2]
-    assert [width(name) for name in ("menu", "wide")] == [372, 400]
+    assert [width(name) for name in ("menu", "scaled", "wide")] == [372, 550, 400], "at most half of the window"
 
 
 def test_layout(s):
