@@ -462,7 +462,7 @@ TEST(Replay, RecordingReplaysIdentically) {
     EXPECT_EQ(again[i].down, played[i].down) << i;
     EXPECT_EQ(again[i].x, played[i].x) << i;
     EXPECT_EQ(again[i].y, played[i].y) << i;
-    EXPECT_EQ(again[i].path, played[i].path) << i;
+    EXPECT_EQ(again[i].files, played[i].files) << i;
   }
   EXPECT_THROW(Recorder("/nowhere/a.replay"), std::runtime_error);
 }
