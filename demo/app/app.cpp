@@ -136,6 +136,7 @@ void App::frame() {
   }
   const std::vector<Event> events = window_->input().take();
   if (!events.empty()) last_event_ = now_;
+  frames_.in_popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
   window_->begin_frame(events, stepped() ? replay_frame : 0.0);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   image_->set_viewport(Panel::viewport(model_, static_cast<double>(screen.x), static_cast<double>(screen.y), ui_scale_),
@@ -211,8 +212,7 @@ void App::handle(const std::vector<Event>& events) {
 
 void App::handle_key(const Event& event) {
   const ImGuiIO& io = ImGui::GetIO();
-  const bool in_popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
-  if (event.down && !in_popup) {
+  if (event.down && !frames_.in_popup) {
     const bool escape = event.code == GLFW_KEY_ESCAPE;
     const auto command = command_of(event.code, event.modifiers, io.WantTextInput);
     // Space activates the focused control during keyboard navigation.

@@ -117,7 +117,8 @@ class App {
     std::uint64_t pictures = 0;        // number of displayed images
     std::uint64_t drawn_pictures = 0;  // value of `pictures` in the last drawn frame
     double drawn_at = -1.0;
-    bool pending = false;  // a change is not drawn yet
+    bool pending = false;   // a change is not drawn yet
+    bool in_popup = false;  // a menu or dialog was open before this frame, which a key may have closed since
   };
 
   DemoOptions options_;

@@ -10,8 +10,7 @@ namespace cumulet::demo {
 
 std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments, std::ostream& out) {
   DemoOptions options;
-  // More samples than for a file, because the image is viewed while it refines.
-  options.scene.sampling.samples = 256;
+  options.scene.sampling.samples = default_samples;
   CLI::App app("Interactive viewer for path-traced volumes.", "cumulet-demo");
   app.footer(
       "In this program --size is the size of the window, --volume is optional, and --spp defaults to 256.\n"

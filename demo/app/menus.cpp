@@ -2,6 +2,7 @@
 
 #include <imgui.h>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace cumulet::demo {
@@ -247,7 +248,7 @@ void draw_menu_bar(Ui& ui, const Model& model, std::vector<Command>& commands) {
   }
   const std::string name = scene_name(model);
   const float width = ImGui::CalcTextSize(name.c_str()).x + ui.px(14.0f);
-  ImGui::SameLine(std::max(ImGui::GetWindowWidth() - width, ImGui::GetCursorPosX()));
+  ImGui::SetCursorPosX(std::max(ImGui::GetWindowWidth() - width, ImGui::GetCursorPosX()));
   Ui::heading(name.c_str());
   ImGui::EndMainMenuBar();
 }

@@ -20,6 +20,9 @@
 
 namespace cumulet::demo {
 
+/// Samples per pixel of a new scene: more than for a file, because the image is viewed while it refines.
+inline constexpr std::uint32_t default_samples = 256;
+
 /// User commands other than changes of settings.
 enum class Action {
   new_scene,

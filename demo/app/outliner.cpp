@@ -88,7 +88,7 @@ class Icon {
 }  // namespace
 
 void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Command>& commands) {
-  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {ui_.px(4.0f), ui_.px(2.0f)});
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {ui_.px(4.0f), ui_.px(4.0f)});
   ImGui::PushStyleColor(ImGuiCol_Header, IM_COL32(95, 143, 191, 120));
   const std::vector<Item> items = listed_items(model.scene);
   const bool has_surfaces = !model.scene.surfaces.empty();

@@ -306,11 +306,11 @@ void Panel::cameras(Model& model) {
       ui_.button("Save camera", "Saves the current view as a camera of the scene; replaces a camera of the same name.",
                  {width, 0.0f});
   ImGui::EndDisabled();
-  ImGui::SameLine();
-  ImGui::BeginDisabled(chosen < 0);
-  const bool remove = ui_.button("Remove camera", "Removes the current camera from the saved cameras.", {width, 0.0f});
-  ImGui::EndDisabled();
-  if (remove && chosen >= 0) cameras.erase(cameras.begin() + chosen);
+  if (chosen >= 0) {
+    ImGui::SameLine();
+    if (ui_.button("Remove camera", "Removes the current camera from the saved cameras.", {width, 0.0f}))
+      cameras.erase(cameras.begin() + chosen);
+  }
   if (!keep || !can_keep) return;
   const auto same = std::ranges::find(cameras, camera_name_, &NamedCamera::name);
   NamedCamera& kept = same != cameras.end() ? *same : cameras.emplace_back();

@@ -8,6 +8,7 @@
 #include <string>
 #include <type_traits>
 
+#include "model.hpp"
 #include "ui.hpp"
 
 namespace cumulet::demo {
@@ -20,6 +21,8 @@ const Desc& default_of() {
     desc.struct_size = sizeof desc;
     SceneOptions scene;
     scene.set_daylight();
+    scene.sampling.samples = default_samples;
+    spell_out_defaults(scene);
     for_each_group(scene, [&](const auto& group) {
       if constexpr (std::is_same_v<std::remove_cvref_t<decltype(group)>, Desc>) desc = group;
     });

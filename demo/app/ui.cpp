@@ -558,6 +558,12 @@ void apply_theme(float scale) {
   set(ImGuiCol_Button, 0x333A44);
   set(ImGuiCol_ButtonHovered, 0x3F4854);
   set(ImGuiCol_ButtonActive, 0x4C5766);
+  set(ImGuiCol_MenuBarBg, 0x23272D);
+  set(ImGuiCol_Tab, 0x23272D);
+  set(ImGuiCol_TabHovered, 0x3A424E);
+  set(ImGuiCol_TabActive, 0x3D5F82);
+  set(ImGuiCol_TabUnfocused, 0x23272D);
+  set(ImGuiCol_TabUnfocusedActive, 0x3D5F82);
   set(ImGuiCol_Header, 0x262B32);
   set(ImGuiCol_HeaderHovered, 0x313842);
   set(ImGuiCol_HeaderActive, 0x3A424E);

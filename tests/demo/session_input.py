@@ -33,7 +33,8 @@ def test_outliner(s):
     s.play("replay", ["wait loaded", *shown("Render"), 'drag "Exposure" to "Exposure" 0.7 0.5', *there, 'report "exposed.json"',
                       'click "Exposure" right', *there, 'report "reset.json"', "key ctrl+z", *there, 'report "again.json"',
                       *shown("Volume 1"), "key ctrl+d", *there, 'report "two.json"', "key delete", *there, 'report "one.json"',
-                      "key ctrl+z", *there, *tab("Edit"), *shot("menu"), 'click "Edit/Undo"', *there, 'report "undone.json"',
+                      "key ctrl+z", *there, *shown("Volume 1"), *tab("View"), "key escape", "frames 2", 'report "escaped.json"',
+                      *tab("Edit"), *shot("menu"), 'click "Edit/Undo"', *there, 'report "undone.json"',
                       *tab("View"), *tab("View/Scale 150 %"), *there, *shot("scaled"),
                       *tab("View"), *tab("View/Scale 100 %"), *there,
                       'drag "Panel edge" to 700 300', *there, *shot("wide")],
@@ -45,6 +46,7 @@ def test_outliner(s):
     assert exposure("again") == exposure("exposed")
     assert [volumes(name) for name in ("again", "two", "one", "undone")] == [1, 2, 1, 1]
     assert [steps(name) for name in ("again", "two", "one", "undone")] == [1, 2, 3, 1]
+    assert s.report("escaped")["chosen"] == "Volume 1", "Escape only closes the menu"
     width = lambda name: 1100 - s.report(name)["viewport"][2]
     assert [width(name) for name in ("menu", "scaled", "wide")] == [372, 550, 400], "at most half of the window"
 
