@@ -121,7 +121,9 @@ void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Comm
 bool Outliner::row(const std::string& control, const char* tip, const std::string& text, const Subject& subject,
                    const Model& model, float room) {
   const ImVec2 corner = ImGui::GetCursorScreenPos();
-  const float width = ImGui::GetContentRegionAvail().x - room;
+  // ImGui extends a selectable by half of the spacing on each side.
+  const float gap = room > 0.0f ? ImGui::GetStyle().ItemSpacing.x : 0.0f;
+  const float width = ImGui::GetContentRegionAvail().x - room - gap;
   const bool clicked = ImGui::Selectable(("##" + control).c_str(), subject_of(model) == subject,
                                          ImGuiSelectableFlags_AllowDoubleClick, {std::max(width, 1.0f), 0.0f});
   ui_.remember(control.c_str(), tip);
@@ -191,7 +193,7 @@ void Outliner::item(Model& model, const Item& item, std::vector<Command>& comman
     ImGui::EndPopup();
   }
   if (visible == nullptr) return;
-  ImGui::SameLine(0.0f, 0.0f);
+  ImGui::SameLine();
   eye("Eye/" + title, *visible);
 }
 

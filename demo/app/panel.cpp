@@ -97,13 +97,15 @@ void Panel::edge(Model& model) {
   const ImVec2 start = ImGui::GetCursorPos();
   ImGui::SetCursorPos({0.0f, 0.0f});
   const ImVec2 size(ui_.px(6.0f), ImGui::GetWindowHeight());
+  const ImVec2 corner = ImGui::GetWindowPos();
+  // The edge is in the window's padding, which the window clips.
+  ImGui::PushClipRect(corner, {corner.x + size.x, corner.y + size.y}, false);
   ImGui::InvisibleButton("##Panel edge", size);
   const bool held = ImGui::IsItemActive();
   const bool lit = held || ImGui::IsItemHovered();
   ui_.remember("Panel edge", "Drag to change the panel's width.");
   if (lit) {
     ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
-    const ImVec2 corner = ImGui::GetWindowPos();
     ImGui::GetWindowDrawList()->AddRectFilled(corner, {corner.x + ui_.px(2.0f), corner.y + size.y},
                                               ImGui::GetColorU32(ImGuiCol_SliderGrabActive));
   }
@@ -111,6 +113,7 @@ void Panel::edge(Model& model) {
     const float width = (ImGui::GetIO().DisplaySize.x - ImGui::GetIO().MousePos.x) / ui_.px(1.0f);
     model.preferences.panel_width = std::clamp(std::round(width), min_panel_width, max_panel_width);
   }
+  ImGui::PopClipRect();
   ImGui::SetCursorPos(start);
 }
 

@@ -132,6 +132,7 @@ TEST_P(PanelTest, LabelsFitBesideTheirControls) {
 }
 
 TEST_P(PanelTest, ThumbnailRotatesTheEnvironment) {
+  select(model_, Part::environment);
   panel_.ui().bring_into_view("Environment view");
   for (int i = 0; i < 5; ++i) frame();
   const auto rectangle = panel_.ui().find("Environment view");
