@@ -40,11 +40,13 @@ constexpr double picture_frame = 0.15;    // maximum seconds that the window wai
 
 App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(preferences_path()) {
   model_.scene = options_.scene;
+  model_.scene_path = options_.scene_file;
   model_.unchosen_ground = options_.unchosen_ground;
   loading_.suggest = model_.scene.auto_density_scale && model_.scene.medium.density_scale == 0.0;
   spell_out_defaults(model_.scene);
   model_.preferences = load_preferences(preferences_path_);
   model_.navigation.style = model_.preferences.style;
+  changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds);
   if (!options_.replay.empty())
     replay_.player.emplace(parse_replay(image::read_file(options_.replay), options_.replay), options_.replay);
   if (!options_.trace.empty()) image::check_writable(options_.trace);
@@ -69,12 +71,13 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
   model_.scene.height = 720;
   if (!options_.open.empty()) open(options_.open);
   history_.emplace(model_.scene);
+  offer_recovery();
 }
 
 App::~App() = default;
 
 void App::run() {
-  while (!quit_ && !window_->should_close()) {
+  while (!quit_) {
     Window::wait(patience());
     // Limits the frame rate: the remaining time is for rendering.
     const double early = now_ + min_frame - glfwGetTime();
@@ -85,12 +88,14 @@ void App::run() {
     frame();
   }
   remember();
+  changes_->recovery().remove();
   if (!options_.trace.empty()) image::replace_file(options_.trace, timeline_.json());
 }
 
 double App::patience() const {
   if (stepped() || window_->input().pending()) return 0.0;
   double wait = replay_.player ? replay_.order.idle : std::numeric_limits<double>::infinity();
+  if (changes_->due()) wait = std::min(wait, std::max(*changes_->due() - now_, min_frame));
   if (frames_.pending) wait = std::min(wait, std::max(frames_.drawn_at + picture_frame - now_, min_frame));
   constexpr double emissive_frame = 1.0 / 30.0;
   if (model_.playing) return std::min(wait, min_frame);
@@ -105,7 +110,9 @@ double App::patience() const {
 
 void App::frame() {
   const double before = std::exchange(now_, glfwGetTime());
-  const auto scale = static_cast<float>(options_.ui_scale > 0.0 ? options_.ui_scale : window_->content_scale());
+  const int percent = model_.preferences.scale_percent;
+  const double chosen = percent > 0 ? 0.01 * percent : window_->content_scale();
+  const auto scale = static_cast<float>(options_.ui_scale > 0.0 ? options_.ui_scale : chosen);
   if (scale != ui_scale_) Window::set_ui_scale(scale);
   ui_scale_ = scale;
   take();
@@ -129,6 +136,7 @@ void App::frame() {
   }
   const std::vector<Event> events = window_->input().take();
   if (!events.empty()) last_event_ = now_;
+  frames_.in_popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
   window_->begin_frame(events, stepped() ? replay_frame : 0.0);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   image_->set_viewport(Panel::viewport(model_, static_cast<double>(screen.x), static_cast<double>(screen.y), ui_scale_),
@@ -137,8 +145,8 @@ void App::frame() {
   image_->follow_pointer();
   if (model_.chosen && !transform_of(model_.scene, *model_.chosen)) model_.chosen.reset();
 
-  model_.can_undo = history_->can_undo(model_.scene);
-  model_.can_redo = history_->can_redo();
+  model_.undo = history_->undo_name(model_.scene);
+  model_.redo = history_->redo_name();
   last_state_ = panel_.state();
   take_thumbnail();
   std::vector<Command> commands;
@@ -154,6 +162,7 @@ void App::frame() {
     take();
   }
   follow_history();
+  autosave();
   const bool picture = frames_.drawn_pictures != frames_.pictures;
   const bool drawn = draw();
   obey(replay_.order);
@@ -168,8 +177,7 @@ void App::frame() {
   measurements_.take_status(model_.status, exchange_.drawn, now_);
   ++frames_.count;
 
-  const std::string& file = model_.scene_path.empty() ? main_file(model_.scene) : model_.scene_path;
-  const std::string name = std::filesystem::path(file).filename().string();
+  const std::string name = scene_name(model_);
   title_ = name.empty() ? "Cumulet" : name + " - Cumulet";
   window_->set_title(title_);
 }
@@ -183,6 +191,9 @@ void App::handle(const std::vector<Event>& events) {
         break;
       case Event::Type::drop:
         open_dropped(event.files);
+        break;
+      case Event::Type::close:
+        execute({Action::quit});
         break;
       case Event::Type::resize:
         window_->resize(static_cast<int>(event.x), static_cast<int>(event.y));
@@ -201,8 +212,7 @@ void App::handle(const std::vector<Event>& events) {
 
 void App::handle_key(const Event& event) {
   const ImGuiIO& io = ImGui::GetIO();
-  const bool in_popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
-  if (event.down && !in_popup) {
+  if (event.down && !frames_.in_popup) {
     const bool escape = event.code == GLFW_KEY_ESCAPE;
     const auto command = command_of(event.code, event.modifiers, io.WantTextInput);
     // Space activates the focused control during keyboard navigation.
@@ -351,7 +361,7 @@ void App::remember_files(const Answer& answer) {
 
 bool App::draw() {
   const Renderer::Picture picture = renderer_->picture();
-  if (picture.texture != 0) {
+  if (picture.texture != 0 && model_.status.has_content) {
     // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
     auto* texture = reinterpret_cast<ImTextureID>(std::uintptr_t{picture.texture});
     const Rectangle& viewport = image_->viewport();
@@ -365,7 +375,8 @@ bool App::draw() {
     behind.AddCallback(cover, gl_.get());
     behind.AddImage(texture, low, high, {0.0f, 1.0f}, {1.0f, 0.0f});
     behind.AddCallback(ImDrawCallback_ResetRenderState, nullptr);
-    image_->draw_handles();
+    // The image still shows the previous objects while a file is loading.
+    if (!exchange_.waiting()) image_->draw_handles();
   }
   image_->draw_region();
   // During a drag there may be 60 changes per second, and with software drivers drawing the window costs as much as an

@@ -18,6 +18,7 @@
 #include "preferences.hpp"
 #include "replay.hpp"
 #include "sequence_clock.hpp"
+#include "unsaved_changes.hpp"
 #include "window.hpp"
 
 struct GladGLContext;
@@ -57,7 +58,20 @@ class App {
   void save_dialog(const char* title, Action action, const char* ending);
   void open(const std::string& path);
   void open_dropped(const std::vector<std::string>& files);
+  /// Opens a scene. source: the file that is read, which may be a copy of the scene file.
+  /// Returns false and reports the error if the file cannot be read.
+  bool open_scene(const std::string& path, const std::string& source);
   void save_scene(const std::string& path);
+  void new_scene();
+  void show(SceneOptions scene, const std::string& path);
+  /// Returns true if the scene has unsaved changes. Asks the user about them; unless he cancels, the commands are then
+  /// executed.
+  bool ask_about_changes(std::vector<Command> commands);
+  void discard_changes();
+  void execute_waiting();
+  void offer_recovery();
+  void recover();
+  void autosave();
   void step_history(bool back);
   void cancel();
 
@@ -87,7 +101,8 @@ class App {
   };
   /// Options of the next load, and the files that are still loading.
   struct Loading {
-    bool reload = false;  // reload the volume even if it is unchanged
+    std::vector<Command> waiting;  // for the user's answer about unsaved changes
+    bool reload = false;           // reload the volume even if it is unchanged
     bool fit = false;
     bool suggest = false;
     bool pick = false;        // the volume being loaded was opened without a grid name
@@ -102,7 +117,8 @@ class App {
     std::uint64_t pictures = 0;        // number of displayed images
     std::uint64_t drawn_pictures = 0;  // value of `pictures` in the last drawn frame
     double drawn_at = -1.0;
-    bool pending = false;  // a change is not drawn yet
+    bool pending = false;   // a change is not drawn yet
+    bool in_popup = false;  // a menu or dialog was open before this frame, which a key may have closed since
   };
 
   DemoOptions options_;
@@ -116,6 +132,7 @@ class App {
   Timeline timeline_;  // used with --trace
   std::unique_ptr<Renderer> renderer_;
   std::optional<History> history_;
+  std::optional<UnsavedChanges> changes_;
   Replay replay_;
   Panel panel_;
   Exchange exchange_;

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
+#include <info.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +21,12 @@ constexpr float exposure_step = 1.0f / 3.0f;  // stops
 constexpr float max_exposure = 10.0f;         // stops
 constexpr double turn_speed = 20.0;           // degrees per second
 
+std::size_t file_count(const SceneOptions& scene) {
+  const std::size_t single =
+      (scene.volume.empty() ? 0 : 1) + (scene.surfaces.empty() ? 0 : 1) + (scene.environment.empty() ? 0 : 1);
+  return single + scene.others.size() + scene.models.size();
+}
+
 }  // namespace
 
 /// The functions of the commands, in the order of Action.
@@ -31,11 +37,19 @@ struct App::Commands {
   };
 
   static constexpr auto table = std::to_array<Row>({
+      {Action::new_scene,
+       [](App& app, const Command& command) {
+         if (!app.ask_about_changes({command})) app.new_scene();
+       }},
       {Action::open_dialog,
        [](App& app, const Command&) {
          app.open_dialog("Open", Action::open, {".vdb", ".nvdb", ".gltf", ".glb", ".hdr", ".exr", ".json"});
        }},
-      {Action::open, [](App& app, const Command& command) { app.open(command.text); }},
+      {Action::open,
+       [](App& app, const Command& command) {
+         if (has_ending(command.text, ".json") && app.ask_about_changes({command})) return;
+         app.open(command.text);
+       }},
       {Action::add_volume_dialog,
        [](App& app, const Command&) { app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb"}); }},
       {Action::add_volume,
@@ -64,6 +78,13 @@ struct App::Commands {
       {Action::save_scene_dialog,
        [](App& app, const Command&) { app.save_dialog("Save scene", Action::save_scene_as, ".json"); }},
       {Action::save_scene_as, [](App& app, const Command& command) { app.save_scene(command.text); }},
+      {Action::discard_changes, [](App& app, const Command&) { app.discard_changes(); }},
+      {Action::recover, [](App& app, const Command&) { app.recover(); }},
+      {Action::discard_recovery,
+       [](App& app, const Command&) {
+         app.changes_->recovery().take_over();
+         app.changes_->recovery().remove();
+       }},
       {Action::png_dialog,
        [](App& app, const Command&) {
          if (app.model_.status.has_content) app.save_dialog("Save image", Action::save_png, ".png");
@@ -91,7 +112,12 @@ struct App::Commands {
          app.model_.panel = true;
          app.panel_.focus();
        }},
+      {Action::duplicate_selected, [](App& app, const Command&) { duplicate_selected(app.model_); }},
+      {Action::remove_selected, [](App& app, const Command&) { remove_selected(app.model_); }},
+      {Action::add_light, [](App& app, const Command&) { add_light(app.model_); }},
       {Action::toggle_help, [](App& app, const Command&) { app.model_.help = !app.model_.help; }},
+      {Action::scale_interface,
+       [](App& app, const Command& command) { app.model_.preferences.scale_percent = command.value; }},
       {Action::toggle_fly,
        [](App& app, const Command&) {
          auto& fly = app.model_.navigation.fly;
@@ -172,7 +198,10 @@ struct App::Commands {
       {Action::draw_region, [](App& app, const Command&) { app.image_->arm_region(); }},
       {Action::clear_region,
        [](App& app, const Command&) { std::ranges::fill(app.model_.scene.sampling.region, 0.0f); }},
-      {Action::quit, [](App& app, const Command&) { app.quit_ = true; }},
+      {Action::quit,
+       [](App& app, const Command& command) {
+         if (!app.ask_about_changes({command})) app.quit_ = true;
+       }},
   });
 
   /// Returns true if each action has a function, at its index.
@@ -218,65 +247,37 @@ void App::cancel() {
 
 void App::open(const std::string& path) {
   if (path.empty()) return;
+  if (has_ending(path, ".json")) {
+    open_scene(path, path);
+    return;
+  }
+  const bool keeps = model_.modified || !model_.scene_path.empty();
   if (is_model(path)) {
     open_surfaces(model_, path);
-    return;
-  }
-  if (is_environment(path)) {
+  } else if (is_environment(path)) {
     model_.scene.environment = loading_.environment = path;
-    return;
-  }
-  if (!has_ending(path, ".json")) {
-    set_volume(model_.scene, {.volume = path});
+  } else {
+    const UpAxis up = known_up_axis(path);
+    set_volume(model_.scene, {.volume = path, .up = up});
+    if (up == UpAxis::z)
+      show_message(model_, false, path + ": Z is up, as its metadata says. Edit, Up axis Y changes that", now_);
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();
     model_.scene.sequence.frame.reset();
     model_.scene.visible = true;
+    model_.subject.reset();
     loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
-    return;
   }
-  try {
-    SceneOptions scene = load_scene(path);
-    loading_.suggest = scene.auto_density_scale && scene.medium.density_scale == 0.0;
-    spell_out_defaults(scene);
-    scene.width = model_.scene.width;
-    scene.height = model_.scene.height;
-    model_.scene = std::move(scene);
-    model_.unchosen_ground = false;
-    model_.scene_path = path;
-    loading_.scene = path;
-    loading_.reload = true;
-    loading_.fit = needs_fit(model_.scene.camera);
-  } catch (const std::exception& error) {
-    complain(error.what());
-    model_.preferences.forget(path);
-  }
+  // A file that is only viewed needs no saving.
+  if (!keeps && file_count(model_.scene) == 1) changes_->reset();
 }
 
 void App::open_dropped(const std::vector<std::string>& files) {
   const DroppedFiles dropped = demo::open_dropped(files);
-  execute(dropped.commands);
+  const bool replaces = !dropped.commands.empty() && has_ending(dropped.commands.front().text, ".json");
+  if (!replaces || !ask_about_changes(dropped.commands)) execute(dropped.commands);
   for (const std::string& file : dropped.left_out)
     show_message(model_, true, file + ": not opened, because another dropped file of its kind was", now_);
-}
-
-void App::save_scene(const std::string& path) {
-  SceneOptions scene = model_.scene;
-  // Saves the viewport size, so that cumulet-render gives the same framing.
-  scene.width = static_cast<std::uint32_t>(std::clamp(image_->viewport().width, 1.0, 16384.0));
-  scene.height = static_cast<std::uint32_t>(std::clamp(image_->viewport().height, 1.0, 16384.0));
-  if (model_.status.play) {
-    scene.sequence.frame = model_.status.play->frame();
-    if (!scene.surfaces.empty()) scene.surface.time = std::max(model_.clock, 0.0);
-  }
-  try {
-    demo::save_scene(scene, path);
-    model_.scene_path = path;
-    model_.preferences.remember(path);
-    show_message(model_, false, "Saved " + path, now_);
-  } catch (const std::exception& error) {
-    show_message(model_, true, error.what(), now_);
-  }
 }
 
 void App::step_history(bool back) {

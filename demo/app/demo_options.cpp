@@ -10,12 +10,12 @@ namespace cumulet::demo {
 
 std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments, std::ostream& out) {
   DemoOptions options;
-  // More samples than for a file, because the image is viewed while it refines.
-  options.scene.sampling.samples = 256;
+  options.scene.sampling.samples = default_samples;
   CLI::App app("Interactive viewer for path-traced volumes.", "cumulet-demo");
   app.footer(
       "In this program --size is the size of the window, --volume is optional, and --spp defaults to 256.\n"
       "Preferences are stored in $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config.\n"
+      "Copies of unsaved changes are stored in $XDG_STATE_HOME/cumulet, or below ~/.local/state.\n"
       "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.");
   app.add_option("file", options.open,
                  "Volume (.vdb, .nvdb), surfaces (.gltf, .glb), environment (.hdr, .exr) or scene (.json)")
@@ -59,6 +59,7 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
+  if (app.count("--scene") > 0) options.scene_file = app.get_option("--scene")->as<std::string>();
   options.sized = app.count("--size") > 0;
   if (!options.open.empty() && (!options.scene.volume.empty() || app.count("--scene") > 0))
     throw UsageError("'" + options.open + "' cannot be combined with --volume or --scene");

@@ -12,6 +12,7 @@ struct DemoOptions {
   SceneOptions scene;
   bool unchosen_ground = false;  // the scene's ground is the default
   bool sized = false;            // --size was given; else the window has the size of the last run
+  std::string scene_file;        // of --scene; empty: none
   std::string open;              // file without a flag: a volume, surfaces, an environment or a scene
   double ui_scale = 0.0;         // 0: content scale of the screen
   std::string replay;

@@ -14,10 +14,10 @@ void Panel::environment(Model& model, std::vector<Command>& commands) {
   const std::string& file = model.scene.environment;
   using Desc = cumulet_environment_settings_desc;
   Desc& settings = model.scene.environment_settings;
-  ui_.value_row(
-      "Image", file.empty() ? "none: drop an .hdr or .exr file here" : std::filesystem::path(file).filename().string());
-  ImGui::BeginDisabled(file.empty());
-  if (model.thumbnail_texture != 0) {
+  const bool any = !file.empty();
+  ui_.value_row("Image",
+                any ? std::filesystem::path(file).filename().string() : "none: drop an .hdr or .exr file here");
+  if (any && model.thumbnail_texture != 0) {
     const auto& camera = model.scene.camera;
     const double ahead =
         std::atan2(camera.target[0] - camera.eye[0], camera.target[2] - camera.eye[2]) * 180.0 / std::numbers::pi;
@@ -26,19 +26,17 @@ void Panel::environment(Model& model, std::vector<Command>& commands) {
                     "marks the viewing direction.",
                     model.thumbnail_texture, settings.rotation_degrees, ahead);
   }
-  settings::for_each<Desc>([&](const auto& setting) { rows_.draw(setting, settings.*setting.field); });
-  ImGui::EndDisabled();
+  if (any) settings::for_each<Desc>([&](const auto& setting) { rows_.draw(setting, settings.*setting.field); });
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   if (ui_.button("Open environment",
                  "Opens an equirectangular Radiance (.hdr) or OpenEXR (.exr) image, or an .exr cube map.",
-                 {width, 0.0f}))
+                 {any ? width : -1.0f, 0.0f}))
     commands.push_back({Action::environment_dialog});
+  if (!any) return;
   ImGui::SameLine();
-  ImGui::BeginDisabled(file.empty());
   if (ui_.button("Remove environment", "Removes the environment map; sun and sky light the scene again.",
                  {width, 0.0f}))
     commands.push_back({Action::clear_environment});
-  ImGui::EndDisabled();
 }
 
 bool Ui::environment(const char* label, const char* tip, unsigned texture, float& rotation_degrees,

@@ -16,7 +16,7 @@ class FileDialog {
   void open(const std::string& title, Action done, std::vector<std::string> endings, const std::string& suggestion);
   /// Draws the dialog if it is open. Adds the command when the user has chosen a file.
   void draw(Ui& ui, const Preferences& preferences, std::vector<Command>& commands);
-  [[nodiscard]] bool is_open() const { return open_; }
+  [[nodiscard]] bool is_open() const { return opening_ || open_; }
 
  private:
   struct Entry {

@@ -28,6 +28,17 @@ std::optional<SceneOptions> History::redo(const SceneOptions& scene) {
   return states_[++now_];
 }
 
+std::optional<std::string> History::undo_name(const SceneOptions& scene) const {
+  if (!same_scene(scene, states_[now_])) return change_name(states_[now_], scene);
+  if (now_ == 0) return std::nullopt;
+  return change_name(states_[now_ - 1], states_[now_]);
+}
+
+std::optional<std::string> History::redo_name() const {
+  if (!can_redo()) return std::nullopt;
+  return change_name(states_[now_], states_[now_ + 1]);
+}
+
 bool History::can_undo(const SceneOptions& scene) const { return now_ > 0 || !same_scene(scene, states_[now_]); }
 
 }  // namespace cumulet::demo

@@ -49,6 +49,7 @@ void ImageInput::take(const Event& event) {
     case Event::Type::character:
     case Event::Type::drop:
     case Event::Type::resize:
+    case Event::Type::close:
       break;
   }
 }
@@ -147,6 +148,7 @@ void ImageInput::to_viewer(const Event& event) {
     case Event::Type::character:
     case Event::Type::drop:
     case Event::Type::resize:
+    case Event::Type::close:
       return;
   }
   exchange_.inputs.push_back({out, event.type == Event::Type::key ? event.code : 0});

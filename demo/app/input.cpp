@@ -119,6 +119,7 @@ std::vector<Event> Input::take() {
       case Event::Type::character:
       case Event::Type::drop:
       case Event::Type::resize:
+      case Event::Type::close:
         break;
     }
     queue_.front().modifiers = modifiers();

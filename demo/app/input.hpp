@@ -11,7 +11,7 @@ namespace cumulet::demo {
 
 /// A window event, from the window system or from a replay file.
 struct Event {
-  enum class Type { move, button, wheel, key, character, drop, resize, focus_lost };
+  enum class Type { move, button, wheel, key, character, drop, resize, focus_lost, close };
 
   Type type = Type::move;
   double x = 0.0;  // move: position in framebuffer pixels; resize: width in framebuffer pixels

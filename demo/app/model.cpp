@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <numbers>
 #include <program.hpp>
 #include <settings.hpp>
 #include <system_error>
@@ -33,6 +34,7 @@ const std::vector<Shortcut>& shortcuts() {
   constexpr unsigned ctrl = modifier_ctrl;
   constexpr unsigned shift = modifier_shift;
   static const std::vector<Shortcut> all = {
+      {GLFW_KEY_N, ctrl, {Action::new_scene}, "Ctrl+N", "New scene"},
       {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
       {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
@@ -73,6 +75,8 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_B, ctrl | modifier_alt, {Action::clear_region}, "Ctrl+Alt+B", "Clear the render region"},
       {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure down, up by a third of a stop"},
       {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
+      {GLFW_KEY_D, ctrl, {Action::duplicate_selected}, "Ctrl+D", "Duplicate the selected object"},
+      {GLFW_KEY_DELETE, 0, {Action::remove_selected}, "Delete", "Remove the selected object"},
       {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel"},
       {GLFW_KEY_F2,
        0,
@@ -88,6 +92,23 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_Q, ctrl, {Action::quit}, "Ctrl+Q", "Quit"},
   };
   return all;
+}
+
+std::string keys_of(const Command& command) {
+  const auto same = [&](const Shortcut& shortcut) {
+    return shortcut.command.action == command.action && shortcut.command.value == command.value;
+  };
+  const auto found = std::ranges::find_if(shortcuts(), same);
+  if (found == shortcuts().end()) return "";
+  std::string keys;
+  if ((found->modifiers & modifier_ctrl) != 0) keys += "Ctrl+";
+  if ((found->modifiers & modifier_alt) != 0) keys += "Alt+";
+  if ((found->modifiers & modifier_shift) != 0) keys += "Shift+";
+  std::string name = key_name(found->key);
+  if (found->key == GLFW_KEY_COMMA) name = ",";
+  if (found->key == GLFW_KEY_PERIOD) name = ".";
+  if (!name.empty() && name[0] >= 'a' && name[0] <= 'z') name[0] = static_cast<char>(name[0] - 'a' + 'A');
+  return keys + name;
 }
 
 std::optional<Command> command_of(int key, unsigned modifiers, bool typing) {
@@ -133,6 +154,72 @@ Model::Model() {
   status.frame.struct_size = sizeof status.frame;
   status.work.struct_size = sizeof status.work;
   status.stats.struct_size = sizeof status.stats;
+}
+
+Subject subject_of(const Model& model) {
+  const std::vector<Item> items = listed_items(model.scene);
+  if (model.subject) {
+    const Item* item = std::get_if<Item>(&*model.subject);
+    const bool exists = item != nullptr ? std::ranges::find(items, *item) != items.end()
+                                        : *model.subject != Subject(Part::surfaces) || !model.scene.surfaces.empty();
+    if (exists) return *model.subject;
+  }
+  if (!items.empty()) return items.front();
+  return model.scene.surfaces.empty() ? Part::render : Part::surfaces;
+}
+
+void select(Model& model, const Subject& subject) {
+  model.subject = subject;
+  model.chosen.reset();
+  const Item* item = std::get_if<Item>(&subject);
+  if (item != nullptr && transform_of(model.scene, *item)) model.chosen = *item;
+}
+
+bool can_remove(const Model& model) {
+  const Subject subject = subject_of(model);
+  return std::holds_alternative<Item>(subject) || subject == Subject(Part::surfaces);
+}
+
+bool can_duplicate(const Model& model) { return std::holds_alternative<Item>(subject_of(model)); }
+
+void remove_selected(Model& model) {
+  const Subject subject = subject_of(model);
+  if (const Item* item = std::get_if<Item>(&subject)) {
+    remove_item(model.scene, *item);
+    spell_out_defaults(model.scene);
+  } else if (subject == Subject(Part::surfaces)) {
+    model.scene.surfaces.clear();
+  } else {
+    return;
+  }
+  model.chosen.reset();
+  model.subject.reset();
+}
+
+void duplicate_selected(Model& model) {
+  const Subject subject = subject_of(model);
+  if (const Item* item = std::get_if<Item>(&subject)) select(model, duplicate_item(model.scene, *item));
+}
+
+namespace {
+
+constexpr double sun_at_noon = 4.0;  // W/m²
+
+}  // namespace
+
+void add_light(Model& model) {
+  const cumulet_camera_desc& camera = model.scene.camera;
+  const double distance =
+      std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
+  const double above = distance > 0.0 ? 0.5 * distance : 1.0;
+  cumulet_light_desc& light = model.scene.analytic_lights.emplace_back();
+  light.struct_size = sizeof light;
+  std::copy(camera.target, camera.target + 3, light.position);
+  light.position[1] += above;
+  light.direction[1] = -1.0;
+  light.power = static_cast<float>(sun_at_noon * 4.0 * std::numbers::pi * above * above);
+  settings::spell_out_zeros(light);
+  select(model, Item{Item::Kind::analytic_light, model.scene.analytic_lights.size() - 1, 0});
 }
 
 void open_surfaces(Model& model, const std::string& path) {
@@ -229,6 +316,13 @@ std::string main_file(const SceneOptions& scene) {
   if (!scene.surfaces.empty()) return scene.surfaces;
   if (!scene.others.empty()) return scene.others.front().volume;
   return scene.models.empty() ? scene.environment : scene.models.front().file;
+}
+
+std::string scene_name(const Model& model) {
+  const std::string& file = model.scene_path.empty() ? main_file(model.scene) : model.scene_path;
+  const std::string name = fs::path(file).filename().string();
+  if (!model.modified) return name;
+  return "*" + (name.empty() ? "Untitled" : name);
 }
 
 std::string suggest_path(const Model& model, const std::string& ending) {

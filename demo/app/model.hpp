@@ -20,8 +20,12 @@
 
 namespace cumulet::demo {
 
+/// Samples per pixel of a new scene: more than for a file, because the image is viewed while it refines.
+inline constexpr std::uint32_t default_samples = 256;
+
 /// User commands other than changes of settings.
 enum class Action {
+  new_scene,
   open_dialog,
   open,  // text: a file of any kind
   add_volume_dialog,
@@ -32,7 +36,10 @@ enum class Action {
   clear_environment,
   save_scene,
   save_scene_dialog,
-  save_scene_as,  // text: the file
+  save_scene_as,    // text: the file
+  discard_changes,  // then carries out the commands that wait for the user's answer
+  recover,          // opens the scene that an ended process has left
+  discard_recovery,
   png_dialog,
   save_png,  // text: the file
   exr_dialog,
@@ -45,7 +52,11 @@ enum class Action {
   dismiss,
   toggle_panel,
   focus_panel,
+  duplicate_selected,
+  remove_selected,
+  add_light,
   toggle_help,
+  scale_interface,  // value: percent; 0: as the screen
   toggle_fly,
   toggle_turntable,
   tool,         // value: a Tool
@@ -84,6 +95,8 @@ struct Shortcut {
 };
 
 [[nodiscard]] const std::vector<Shortcut>& shortcuts();
+/// Returns the keys of a command as menus show them, such as "Ctrl+Shift+S"; "" if it has none.
+[[nodiscard]] std::string keys_of(const Command& command);
 /// Returns the command of a key; nullopt if there is none. typing: a text field has the focus, which uses the other
 /// keys itself.
 [[nodiscard]] std::optional<Command> command_of(int key, unsigned modifiers, bool typing);
@@ -198,14 +211,16 @@ struct Model {
   bool adaptive_resolution = true;
   bool panel = true;
   bool help = false;
-  Tool tool = Tool::move;      // none: no handles, outlines or light icons in the image
-  Axes axes = Axes::world;     // axes of the handles
-  std::optional<Item> chosen;  // selected object
+  Tool tool = Tool::move;          // none: no handles, outlines or light icons in the image
+  Axes axes = Axes::world;         // axes of the handles
+  std::optional<Item> chosen;      // selected object
+  std::optional<Subject> subject;  // what the inspector shows; nullopt: the first object
   bool playing = false;
-  double clock = 0.0;  // seconds; the surfaces' animation uses it too if a sequence is shown
-  bool can_undo = false;
-  bool can_redo = false;
-  std::string scene_path;  // scene file that was opened or saved last
+  double clock = 0.0;               // seconds; the surfaces' animation uses it too if a sequence is shown
+  std::optional<std::string> undo;  // name of the step that can be undone
+  std::optional<std::string> redo;  // name of the step that can be repeated
+  std::string scene_path;           // scene file that was opened or saved last
+  bool modified = false;            // the scene has unsaved changes
   std::vector<GridInfo> grids;
   Status status;
   unsigned thumbnail_texture = 0;  // OpenGL name of status.thumbnail in the window's context; 0: none
@@ -215,6 +230,18 @@ struct Model {
 
   Model();
 };
+
+/// Returns what the inspector shows. Objects that are removed are replaced by the first one.
+[[nodiscard]] Subject subject_of(const Model& model);
+/// Shows a part or object in the inspector. Objects with a position are also selected in the image.
+void select(Model& model, const Subject& subject);
+/// Returns true if the subject of the inspector can be removed or duplicated.
+[[nodiscard]] bool can_remove(const Model& model);
+[[nodiscard]] bool can_duplicate(const Model& model);
+void remove_selected(Model& model);
+void duplicate_selected(Model& model);
+/// Adds a point light above the camera's target, with the irradiance of the noon sun there, and selects it.
+void add_light(Model& model);
 
 /// Opens the surfaces of a file. They replace the previous surfaces and the default ground, because models usually have
 /// their own.
@@ -241,6 +268,10 @@ struct Work {
 
 /// Returns the file that a scene is named after: the volume's, or the first other file in the scene.
 [[nodiscard]] std::string main_file(const SceneOptions& scene);
+
+/// Returns the name of the scene: that of its scene file, or else of its main file; "" for an empty scene. An asterisk
+/// at the front marks unsaved changes.
+[[nodiscard]] std::string scene_name(const Model& model);
 
 /// Suggests a path for a new file: the main file's name, a free number and the extension, in the last used folder.
 [[nodiscard]] std::string suggest_path(const Model& model, const std::string& ending);

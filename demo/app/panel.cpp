@@ -11,14 +11,15 @@
 #include <presets.hpp>
 #include <settings.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "history.hpp"
+#include "menus.hpp"
 
 namespace cumulet::demo {
 namespace {
 
-constexpr float panel_width = 372.0f;
 constexpr float timeline_height = 58.0f;
 constexpr ImGuiWindowFlags overlay = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                                      ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
@@ -36,10 +37,12 @@ std::string file_name(const std::string& path) { return std::filesystem::path(pa
 }  // namespace
 
 Rectangle Panel::viewport(const Model& model, double width, double height, float scale) {
-  const double side = model.panel ? std::min(std::round(static_cast<double>(panel_width * scale)), width * 0.5) : 0.0;
+  const double wanted = std::round(static_cast<double>(model.preferences.panel_width * scale));
+  const double side = model.panel ? std::min(wanted, width * 0.5) : 0.0;
+  const double above = std::min(static_cast<double>(ImGui::GetFrameHeight()), height);
   const double below =
-      model.status.play ? std::min(std::round(static_cast<double>(timeline_height * scale)), height) : 0.0;
-  return {0.0, 0.0, std::max(width - side, 0.0), height - below};
+      model.status.play ? std::min(std::round(static_cast<double>(timeline_height * scale)), height - above) : 0.0;
+  return {0.0, above, std::max(width - side, 0.0), height - above - below};
 }
 
 void Panel::draw(Model& model, float scale, double time, std::vector<Command>& commands) {
@@ -47,6 +50,7 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   ui_.begin(scale, time);
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   view_ = viewport(model, static_cast<double>(screen.x), static_cast<double>(screen.y), scale);
+  draw_menu_bar(ui_, model, commands);
   if (model.panel) side(model, commands);
   if (model.status.play) timeline(model, commands);
   if (!model.status.has_content && !model.status.busy) hint();
@@ -60,136 +64,65 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   help_was_closed_ = !model.help;
   dialog_.draw(ui_, model.preferences, commands);
   picker_.draw(ui_, commands);
+  question_.draw(ui_, commands);
 }
 
 void Panel::side(Model& model, std::vector<Command>& commands) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const auto left = static_cast<float>(view_.width);
-  ImGui::SetNextWindowPos({left, 0.0f});
-  ImGui::SetNextWindowSize({screen.x - left, screen.y});
+  const auto top = static_cast<float>(view_.y);
+  if (model.chosen && model.chosen != seen_) model.subject = *model.chosen;
+  seen_ = model.chosen;
+  ImGui::SetNextWindowPos({left, top});
+  ImGui::SetNextWindowSize({screen.x - left, screen.y - top});
   if (focus_) ImGui::SetNextWindowFocus();
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
-  ImGui::Begin("Settings", nullptr,
+  ImGui::Begin(panel_name, nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing);
   ImGui::PopStyleVar();
-  toolbar(model, commands);
+  edge(model);
+  // The inspector keeps at least three fifths of the height.
+  outliner_.draw(model, 0.4f * ImGui::GetContentRegionAvail().y, std::exchange(focus_, false), commands);
   ImGui::Spacing();
-  ImGui::BeginChild("sections", {0.0f, 0.0f}, false, ImGuiWindowFlags_NavFlattened | ImGuiWindowFlags_NoBackground);
-  const auto section = [this](const char* label, bool open, const auto& content) {
-    if (ui_.section(label, open)) {
-      ImGui::Spacing();
-      content();
-      ImGui::Dummy({0.0f, ui_.px(6.0f)});
-    }
-  };
-  section("File", true, [&] { file(model, commands); });
-  if (model.status.play || model.status.neighbours) section("Sequence", true, [&] { sequence(model, commands); });
-  section("Scene", true, [&] { items(model); });
-  section("Display", true, [&] { display(model); });
-  section("Sun & sky", true, [&] { light(model); });
-  section("Environment", true, [&] { environment(model, commands); });
-  section("Lights", true, [&] { analytic_lights(model); });
-  section("Medium", true, [&] { medium(model, commands); });
-  section("Volumes", true, [&] { volumes(model, commands); });
-  section("Surfaces", true, [&] { surfaces(model); });
-  section("Models", true, [&] { models(model, commands); });
-  section("Grid", true, [&] { grid(model); });
-  section("Camera", true, [&] { camera(model, commands); });
-  section("Sampling", true, [&] { sampling(model); });
-  section("Statistics", true, [&] { statistics(model); });
+  ImGui::Separator();
+  ImGui::Spacing();
+  ImGui::BeginChild("inspector", {0.0f, 0.0f}, false, ImGuiWindowFlags_NavFlattened | ImGuiWindowFlags_NoBackground);
+  inspector(model, commands);
   ImGui::EndChild();
   ImGui::End();
 }
 
-void Panel::toolbar(Model& model, std::vector<Command>& commands) {
-  const float spacing = ImGui::GetStyle().ItemSpacing.x;
-  const float width = (ImGui::GetContentRegionAvail().x - 4.0f * spacing) / 5.0f;
-  const auto button = [&](const char* label, const char* tip, Action action, bool enabled) {
-    ImGui::BeginDisabled(!enabled);
-    if (ui_.button(label, tip, {width, 0.0f})) commands.push_back({action});
-    ImGui::EndDisabled();
-  };
-  if (focus_) ImGui::SetKeyboardFocusHere();
-  focus_ = false;
-  button("Open",
-         "Open a volume, surfaces, an environment or a scene (Ctrl+O). Files can also be dropped on the window.",
-         Action::open_dialog, true);
-  ImGui::SameLine();
-  button("Save", "Save the scene: all settings and the camera (Ctrl+S; save as: Ctrl+Shift+S).", Action::save_scene,
-         true);
-  ImGui::SameLine();
-  button("Undo", "Undo the last change (Ctrl+Z).", Action::undo, model.can_undo);
-  ImGui::SameLine();
-  button("Redo", "Redo the last undone change (Ctrl+Shift+Z).", Action::redo, model.can_redo);
-  ImGui::SameLine();
-  button("Help", "All keys and mouse buttons (F1).", Action::toggle_help, true);
-}
-
-void Panel::file(Model& model, std::vector<Command>& commands) {
-  if (path_of_ != model.scene.volume) path_ = path_of_ = model.scene.volume;
-  if (ui_.text("Volume",
-               "File to open: volume (.vdb, .nvdb), surfaces (.gltf, .glb) or scene (.json). Press Enter to open it.",
-               "Path of a file", path_))
-    commands.push_back({Action::open, path_});
-
-  std::vector<Choice> recent;
-  std::vector<std::string> names;
-  names.reserve(model.preferences.recent.size());
-  for (const std::string& path : model.preferences.recent) names.push_back(file_name(path));
-  for (std::size_t i = 0; i < names.size(); ++i)
-    recent.push_back({names[i].c_str(), static_cast<int>(i), model.preferences.recent[i].c_str()});
-  int chosen = -1;
-  ImGui::BeginDisabled(recent.empty());
-  if (ui_.choose("Recent", "Recently opened files.", recent, chosen))
-    commands.push_back({Action::open, model.preferences.recent[static_cast<std::size_t>(chosen)]});
-  ImGui::EndDisabled();
-
-  std::vector<Choice> grids;
-  std::vector<std::string> tips;
-  tips.reserve(model.grids.size());
-  int now = -1;
-  for (std::size_t i = 0; i < model.grids.size(); ++i) {
-    const GridInfo& grid = model.grids[i];
-    tips.push_back(grid.refusal.empty() ? grid.type : grid.type + ": " + grid.refusal);
-    grids.push_back({grid.name.c_str(), static_cast<int>(i), tips.back().c_str()});
-    if (grid.name == model.status.grid) now = static_cast<int>(i);
+void Panel::edge(Model& model) {
+  const ImVec2 start = ImGui::GetCursorPos();
+  ImGui::SetCursorPos({0.0f, 0.0f});
+  const ImVec2 size(ui_.px(6.0f), ImGui::GetWindowHeight());
+  const ImVec2 corner = ImGui::GetWindowPos();
+  // The edge is in the window's padding, which the window clips.
+  ImGui::PushClipRect(corner, {corner.x + size.x, corner.y + size.y}, false);
+  ImGui::InvisibleButton("##Panel edge", size);
+  const bool held = ImGui::IsItemActive();
+  const bool lit = held || ImGui::IsItemHovered();
+  ui_.remember("Panel edge", "Drag to change the panel's width.");
+  if (lit) {
+    ImGui::SetMouseCursor(ImGuiMouseCursor_ResizeEW);
+    ImGui::GetWindowDrawList()->AddRectFilled(corner, {corner.x + ui_.px(2.0f), corner.y + size.y},
+                                              ImGui::GetColorU32(ImGuiCol_SliderGrabActive));
   }
-  ImGui::BeginDisabled(grids.empty());
-  if (ui_.choose("Grid name", "Density grid: a scalar fog volume of the file.", grids, now))
-    model.scene.grid_name = model.grids[static_cast<std::size_t>(now)].name;
-  ImGui::EndDisabled();
-
-  ImGui::BeginDisabled(!model.status.has_volume);
-  int up = static_cast<int>(model.scene.up);
-  if (ui_.choose("Up axis", "Up axis of the volume. The file is loaded again and framed.",
-                 {{"Y", static_cast<int>(UpAxis::y), "Y is up."},
-                  {"Z", static_cast<int>(UpAxis::z), "Z is up, as in files of Blender and Mantaflow."}},
-                 up))
-    commands.push_back({Action::choose_up, {}, up});
-  if (ui_.button("Inspect grids", "Shows type, voxels, range and histogram of each grid, and lets you select one.",
-                 {-1.0f, 0.0f}))
-    commands.push_back({Action::grids_dialog});
-  ImGui::EndDisabled();
-  const float spacing = ImGui::GetStyle().ItemSpacing.x;
-  const float width = (ImGui::GetContentRegionAvail().x - spacing) / 2.0f;
-  ImGui::BeginDisabled(!model.status.has_content);
-  if (ui_.button("Save PNG", "Save the displayed image at full resolution (F12).", {width, 0.0f}))
-    commands.push_back({Action::png_dialog});
-  ImGui::SameLine();
-  if (ui_.button("Save EXR", "Save the linear radiance and AOVs as OpenEXR (Shift+F12).", {width, 0.0f}))
-    commands.push_back({Action::exr_dialog});
-  ImGui::EndDisabled();
+  if (held) {
+    const float width = (ImGui::GetIO().DisplaySize.x - ImGui::GetIO().MousePos.x) / ui_.px(1.0f);
+    model.preferences.panel_width = std::clamp(std::round(width), min_panel_width, max_panel_width);
+  }
+  ImGui::PopClipRect();
+  ImGui::SetCursorPos(start);
 }
 
 void Panel::display(Model& model) {
-  settings::with(&cumulet_sampling_desc::view, [&](const auto& view) { rows_.draw(view, model.scene.sampling.view); });
   using Desc = cumulet_display_desc;
   Desc& display = model.scene.display;
   settings::for_each<Desc>([&](const auto& setting) {
-    ImGui::BeginDisabled(setting.is(&Desc::background_color) && display.background != CUMULET_BACKGROUND_COLOR);
+    if (setting.is(&Desc::background_color) && display.background != CUMULET_BACKGROUND_COLOR) return;
     rows_.draw(setting, display.*setting.field);
-    ImGui::EndDisabled();
   });
 }
 
@@ -207,26 +140,23 @@ void Panel::light(Model& model) {
   settings::for_each<Desc>([&](const auto& setting) {
     const bool of_constant = setting.is(&Desc::sun_irradiance) || setting.is(&Desc::sky_radiance);
     const bool of_physical = setting.is(&Desc::turbidity) || setting.is(&Desc::ground_albedo);
-    ImGui::BeginDisabled((of_constant && physical) || (of_physical && !physical));
+    if (physical ? of_constant : of_physical) return;
     if (setting.is(&Desc::sun_angle_degrees)) {
       sun_angle(setting, light);
     } else {
       rows_.draw(setting, light.*setting.field);
     }
-    ImGui::EndDisabled();
   });
-  ground(model);
 }
 
 void Panel::ground(Model& model) {
   cumulet_ground_desc& ground = model.scene.ground;
   using Desc = cumulet_ground_desc;
   settings::for_each<Desc>([&](const auto& setting) {
-    ImGui::BeginDisabled((setting.is(&Desc::albedo) && ground.mode == CUMULET_GROUND_NONE) ||
-                         (setting.is(&Desc::height) && ground.mode != CUMULET_GROUND_AT_HEIGHT));
+    if (setting.is(&Desc::albedo) && ground.mode == CUMULET_GROUND_NONE) return;
+    if (setting.is(&Desc::height) && ground.mode != CUMULET_GROUND_AT_HEIGHT) return;
     const bool chosen = rows_.draw(setting, ground.*setting.field);
     if (chosen && setting.is(&Desc::mode)) model.unchosen_ground = false;
-    ImGui::EndDisabled();
   });
 }
 
@@ -240,26 +170,22 @@ void Panel::surfaces(Model& model) {
   using Desc = cumulet_surface_settings_desc;
   Desc& surface = model.scene.surface;
   const cumulet_surfaces_info& info = model.status.surfaces;
-  const bool any = !model.scene.surfaces.empty();
-  ui_.value_row("Model", any ? file_name(model.scene.surfaces) : "none: drop a .gltf or .glb file here");
-  ImGui::BeginDisabled(!any);
+  ui_.value_row("Model", model.scene.surfaces);
   settings::for_each<Desc>([&](const auto& setting) {
     if (!setting.is(&Desc::time)) rows_.draw(setting, surface.*setting.field);
   });
-  ImGui::BeginDisabled(info.animations == 0);
-  settings::with(&Desc::time, [&](auto time) {
-    time.row.most = std::max(model.status.animation.duration, 1e-3);
-    // If a sequence is shown, the animation uses its clock.
-    double clock = std::max(model.clock, 0.0);
-    ImGui::BeginDisabled(model.status.play.has_value());
-    rows_.draw(time, model.status.play ? clock : surface.time);
-    ImGui::EndDisabled();
-  });
-  ImGui::EndDisabled();
+  if (info.animations > 0) {
+    settings::with(&Desc::time, [&](auto time) {
+      time.row.most = std::max(model.status.animation.duration, 1e-3);
+      // If a sequence is shown, the animation uses its clock.
+      double clock = std::max(model.clock, 0.0);
+      ImGui::BeginDisabled(model.status.play.has_value());
+      rows_.draw(time, model.status.play ? clock : surface.time);
+      ImGui::EndDisabled();
+    });
+  }
   variant(model);
-  if (any) ui_.value_row("Triangles", short_count(double(info.triangles)));
-  if (ui_.button("Remove surfaces", "Removes the surfaces.")) model.scene.surfaces.clear();
-  ImGui::EndDisabled();
+  ui_.value_row("Triangles", short_count(double(info.triangles)));
 }
 
 void Panel::variant(Model& model) {
@@ -281,6 +207,25 @@ void Panel::variant(Model& model) {
   if (chosen > 0 && wanted.empty()) wanted = std::to_string(index);
 }
 
+namespace {
+
+/// Returns true if the setting has an effect: the phase function has it, and the volume has the grid that it scales.
+template <class Setting>
+bool acts(const Setting& setting, const cumulet_medium_desc& medium, const Status& status) {
+  using Desc = cumulet_medium_desc;
+  if (setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight))
+    return medium.phase == CUMULET_PHASE_TWO_LOBE;
+  if (setting.is(&Desc::droplet_diameter)) return medium.phase == CUMULET_PHASE_MIE;
+  if (setting.is(&Desc::anisotropy)) return medium.phase != CUMULET_PHASE_MIE;
+  const auto has = [&](cumulet_ramp grid) { return status.fields[static_cast<std::size_t>(grid)].most > 0.0f; };
+  if (setting.is(&Desc::flame_strength) || setting.is(&Desc::flame_color)) return has(CUMULET_RAMP_FLAME);
+  const bool of_heat = setting.is(&Desc::temperature_scale) || setting.is(&Desc::temperature_offset) ||
+                       setting.is(&Desc::blackbody) || setting.is(&Desc::blackbody_tint);
+  return !of_heat || has(CUMULET_RAMP_TEMPERATURE);
+}
+
+}  // namespace
+
 void Panel::medium(Model& model, std::vector<Command>& commands) {
   using Desc = cumulet_medium_desc;
   Desc& medium = model.scene.medium;
@@ -292,18 +237,11 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   if (ui_.choose("Preset", "Preset of the medium; does not change the density scale and the ramps.", presets, chosen))
     apply(static_cast<Preset>(chosen), medium);
   settings::for_each<Desc>([&](const auto& setting) {
-    const bool of_lobes = setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight);
-    ImGui::BeginDisabled((of_lobes && medium.phase != CUMULET_PHASE_TWO_LOBE) ||
-                         (setting.is(&Desc::droplet_diameter) && medium.phase != CUMULET_PHASE_MIE) ||
-                         (setting.is(&Desc::anisotropy) && medium.phase == CUMULET_PHASE_MIE));
+    if (!acts(setting, medium, model.status)) return;
     rows_.draw(setting, medium.*setting.field);
-    ImGui::EndDisabled();
-    if (setting.is(&Desc::density_scale)) {
-      ImGui::BeginDisabled(!model.status.has_volume);
-      if (ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f}))
-        commands.push_back({Action::auto_density});
-      ImGui::EndDisabled();
-    }
+    if (setting.is(&Desc::density_scale) && model.status.has_volume &&
+        ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f}))
+      commands.push_back({Action::auto_density});
     if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
   });
   ramps(model);
@@ -323,15 +261,13 @@ void Panel::grid(Model& model) {
   using Desc = cumulet_grid_desc;
   Desc& grid = model.scene.grid;
   settings::for_each<Desc>([&](const auto& setting) {
-    const bool of_cells = !setting.is(&Desc::type);
-    ImGui::BeginDisabled((of_cells && grid.type != CUMULET_GRID_TETRAHEDRAL) ||
-                         (setting.is(&Desc::pixel_size) && grid.camera_adaptive == 0));
+    if (!setting.is(&Desc::type) && grid.type != CUMULET_GRID_TETRAHEDRAL) return;
+    if (setting.is(&Desc::pixel_size) && grid.camera_adaptive == 0) return;
     if (setting.is(&Desc::threshold)) {
       threshold(setting, grid);
     } else if (rows_.draw(setting, grid.*setting.field) && setting.is(&Desc::criterion)) {
       grid.threshold = settings::default_threshold(grid.criterion);
     }
-    ImGui::EndDisabled();
   });
 
   const cumulet_stats& stats = model.status.stats;
@@ -351,10 +287,7 @@ void Panel::threshold(settings::SettingInfo info, cumulet_grid_desc& grid) {
   const bool range = grid.criterion == CUMULET_CRITERION_RANGE_MEAN;
   info.row.least = range ? 1e-2 : 1e-4;
   info.row.most = range ? 100.0 : 1.0;
-  double shown = to_voxel ? 0.0 : grid.threshold;
-  ImGui::BeginDisabled(to_voxel);
-  if (rows_.draw(info, shown)) grid.threshold = shown;
-  ImGui::EndDisabled();
+  if (!to_voxel) rows_.draw(info, grid.threshold);
 }
 
 void Panel::cameras(Model& model) {
@@ -365,10 +298,9 @@ void Panel::cameras(Model& model) {
   choices.reserve(cameras.size());
   for (const NamedCamera& camera : cameras)
     choices.push_back({camera.name.c_str(), static_cast<int>(choices.size()), "A saved camera of the scene."});
-  ImGui::BeginDisabled(cameras.empty());
-  if (ui_.choose("Saved camera", "The saved camera that is shown, until the camera is moved.", choices, chosen))
+  if (!cameras.empty() &&
+      ui_.choose("Saved camera", "The saved camera that is shown, until the camera is moved.", choices, chosen))
     look_through(model.scene, cameras[static_cast<std::size_t>(chosen)].name);
-  ImGui::EndDisabled();
   bool keep = ui_.text("Camera name", "Name for saving the current view.", "name", camera_name_);
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const bool can_keep = !camera_name_.empty() && !needs_fit(model.scene.camera);
@@ -377,11 +309,11 @@ void Panel::cameras(Model& model) {
       ui_.button("Save camera", "Saves the current view as a camera of the scene; replaces a camera of the same name.",
                  {width, 0.0f});
   ImGui::EndDisabled();
-  ImGui::SameLine();
-  ImGui::BeginDisabled(chosen < 0);
-  const bool remove = ui_.button("Remove camera", "Removes the current camera from the saved cameras.", {width, 0.0f});
-  ImGui::EndDisabled();
-  if (remove && chosen >= 0) cameras.erase(cameras.begin() + chosen);
+  if (chosen >= 0) {
+    ImGui::SameLine();
+    if (ui_.button("Remove camera", "Removes the current camera from the saved cameras.", {width, 0.0f}))
+      cameras.erase(cameras.begin() + chosen);
+  }
   if (!keep || !can_keep) return;
   const auto same = std::ranges::find(cameras, camera_name_, &NamedCamera::name);
   NamedCamera& kept = same != cameras.end() ? *same : cameras.emplace_back();
@@ -396,10 +328,8 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
     bool on = navigation.turntable_degrees_per_second != 0.0;
     if (ui_.checkbox("Turntable", "Rotates the camera around the target (T).", on))
       commands.push_back({Action::toggle_turntable});
-    ImGui::BeginDisabled(!on);
     double speed = navigation.turntable_degrees_per_second;
-    if (rows_.draw(info, speed) && on) navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
-    ImGui::EndDisabled();
+    if (on && rows_.draw(info, speed)) navigation.turntable_degrees_per_second = speed == 0.0 ? 0.1 : speed;
   };
   settings::for_each<Desc>([&](const auto& setting) {
     if (setting.is(&Desc::turntable_degrees_per_second)) return turn(setting);
@@ -415,10 +345,9 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
   settings::with(&cumulet_camera_desc::fovy_degrees,
                  [&](const auto& fovy) { other |= rows_.draw(fovy, view.fovy_degrees); });
   settings::with(&cumulet_camera_desc::lens_radius, [&](const auto& lens) { rows_.draw(lens, view.lens_radius); });
-  ImGui::BeginDisabled(view.lens_radius == 0.0);
-  settings::with(&cumulet_camera_desc::focus_distance,
-                 [&](const auto& focus) { rows_.draw(focus, view.focus_distance); });
-  ImGui::EndDisabled();
+  if (view.lens_radius > 0.0)
+    settings::with(&cumulet_camera_desc::focus_distance,
+                   [&](const auto& focus) { rows_.draw(focus, view.focus_distance); });
   bool orthographic = view.orthographic_height > 0.0;
   if (ui_.checkbox("Orthographic", "Parallel projection.", orthographic)) {
     const double distance =
@@ -440,7 +369,16 @@ void Panel::camera(Model& model, std::vector<Command>& commands) {
 void Panel::sampling(Model& model) {
   using Desc = cumulet_sampling_desc;
   settings::for_each<Desc>([&](const auto& setting) {
-    if (!setting.is(&Desc::view)) rows_.draw(setting, model.scene.sampling.*setting.field);
+    const bool advanced = setting.is(&Desc::seed) || setting.is(&Desc::region) || setting.is(&Desc::shutter_seconds);
+    if (!advanced && !setting.is(&Desc::view)) rows_.draw(setting, model.scene.sampling.*setting.field);
+  });
+}
+
+void Panel::advanced_sampling(Model& model) {
+  using Desc = cumulet_sampling_desc;
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (setting.is(&Desc::seed) || setting.is(&Desc::region) || setting.is(&Desc::shutter_seconds))
+      rows_.draw(setting, model.scene.sampling.*setting.field);
   });
   ui_.checkbox("Fast preview", "Renders at a lower resolution during changes. Off: always full resolution.",
                model.adaptive_resolution);
@@ -456,7 +394,7 @@ void Panel::statistics(const Model& model) {
            print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));
   ui_.plot("Samples per second", "Completed camera paths per second.", charts.samples_per_second.values(),
            short_count(static_cast<double>(charts.samples_per_second.latest())) + "/s");
-  ui_.plot("Noise", "Relative standard error of the image, measured once per second while it refines.",
+  ui_.plot("Noise", "Relative standard error of the samples, before denoising, measured once per second.",
            charts.noise_percent.values(), status.noise ? print("%.2f %%", 100.0 * *status.noise) : std::string("-"));
   ui_.plot("GPU time", "GPU milliseconds of the library's passes per frame.", charts.device_ms.values(),
            print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
@@ -482,7 +420,7 @@ void Panel::statistics(const Model& model) {
 }
 
 void Panel::hint() const {
-  const ImVec2 middle(static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.height) * 0.5f);
+  const ImVec2 middle(static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.y + 0.5 * view_.height));
   ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
   ImGui::SetNextWindowBgAlpha(0.75f);
   ImGui::Begin("hint", nullptr, overlay | ImGuiWindowFlags_NoInputs);
@@ -498,7 +436,8 @@ void Panel::hint() const {
 void Panel::loading(const Model& model, std::vector<Command>& commands) {
   const Work work = work_of(model.status);
   const float width = std::min(ui_.px(380.0f), static_cast<float>(view_.width) - ui_.px(24.0f));
-  ImGui::SetNextWindowPos({static_cast<float>(view_.width) * 0.5f, ui_.px(12.0f)}, ImGuiCond_Always, {0.5f, 0.0f});
+  ImGui::SetNextWindowPos({static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.y) + ui_.px(12.0f)},
+                          ImGuiCond_Always, {0.5f, 0.0f});
   ImGui::SetNextWindowSize({width, 0.0f});
   ImGui::SetNextWindowBgAlpha(0.88f);
   ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
@@ -523,7 +462,7 @@ void Panel::messages(Model& model, std::vector<Command>& commands) {
   std::erase_if(model.messages, [this](const Message& message) { return !message.error && message.until < time_; });
   if (model.messages.empty()) return;
   const float width = static_cast<float>(view_.width) - ui_.px(24.0f);
-  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(44.0f)}, ImGuiCond_Always,
+  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(44.0f)}, ImGuiCond_Always,
                           {0.0f, 1.0f});
   ImGui::SetNextWindowSize({width, 0.0f});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(10.0f), ui_.px(7.0f)});
@@ -562,22 +501,28 @@ void Panel::state_line(const Model& model) {
   if (converged) text = print("%u samples", model.scene.sampling.samples);
   if (model.scene.sampling.noise_target_percent > 0.0f && status.frame.width > 0) {
     // With a noise target, the number of samples is only a maximum.
-    const double pixels = double(status.frame.width) * status.frame.height;
-    text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / pixels));
+    const double all = double(status.frame.width) * status.frame.height;
+    text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / all));
     if (!converged) text += print(" (%.0f %%)", std::floor(100.0 * part));
   }
   const cumulet_view_mode shown = model.scene.sampling.view;
   for (const auto& view : settings::view_choices)
     if (view.value == shown && shown != CUMULET_VIEW_SHADED) text = view.name;
-  if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0)
-    text += print("   preview %ux%u", status.frame.width, status.frame.height);
-  else
-    text += print("   %ux%u", status.frame.width, status.frame.height);
-  if (status.noise) text += print("   noise %.2f %%", 100.0 * *status.noise);
+  // During a preview the image has no samples of its size.
+  if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0) text = "Preview";
+  text += print("   %ux%u", status.frame.width, status.frame.height);
+  // The noise is that of the samples, which the denoised image does not show. Few samples do not tell it.
+  constexpr double min_noise_samples = 4.0;
+  const double pixels = double(status.frame.width) * status.frame.height;
+  const bool is_shaded = shown == CUMULET_VIEW_SHADED;
+  if (is_shaded && model.scene.display.denoise != CUMULET_DENOISE_OFF)
+    text += "   denoised";
+  else if (status.noise && static_cast<double>(status.stats.samples) >= min_noise_samples * pixels)
+    text += print("   noise %.2f %%", 100.0 * *status.noise);
   if (model.navigation.fly != 0) text += "   flying";
   if (!status.saving.empty()) text += "   saving " + file_name(status.saving) + " when all pixels are sampled";
   state_ = text;
-  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
+  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
                           {0.0f, 1.0f});
   ImGui::SetNextWindowBgAlpha(0.55f);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(9.0f), ui_.px(4.0f)});
@@ -587,8 +532,8 @@ void Panel::state_line(const Model& model) {
   ImGui::PopStyleVar();
   // Rounded to whole pixels, because a smaller change would redraw the window without effect.
   ImGui::GetForegroundDrawList()->AddRectFilled(
-      {0.0f, static_cast<float>(view_.height) - ui_.px(2.0f)},
-      {static_cast<float>(std::floor(view_.width * part)), static_cast<float>(view_.height)},
+      {0.0f, static_cast<float>(view_.y + view_.height) - ui_.px(2.0f)},
+      {static_cast<float>(std::floor(view_.width * part)), static_cast<float>(view_.y + view_.height)},
       IM_COL32(95, 143, 191, 200));
 }
 

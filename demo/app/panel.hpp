@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +8,8 @@
 #include "file_dialog.hpp"
 #include "grid_picker.hpp"
 #include "model.hpp"
+#include "outliner.hpp"
+#include "question.hpp"
 #include "ramp_edit.hpp"
 #include "rows.hpp"
 #include "ui.hpp"
@@ -27,33 +28,37 @@ class Panel {
   void focus() { focus_ = true; }
   [[nodiscard]] FileDialog& dialog() { return dialog_; }
   /// Returns true if a modal dialog is open.
-  [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open(); }
+  [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open() || question_.is_open(); }
   [[nodiscard]] GridPicker& picker() { return picker_; }
+  [[nodiscard]] Question& question() { return question_; }
+  [[nodiscard]] const Question& question() const { return question_; }
   [[nodiscard]] Ui& ui() { return ui_; }
   /// Returns the last drawn text line below the image; "" if there is none.
   [[nodiscard]] const std::string& state() const { return state_; }
 
  private:
   void side(Model& model, std::vector<Command>& commands);
-  void toolbar(Model& model, std::vector<Command>& commands);
-  void file(Model& model, std::vector<Command>& commands);
+  // Draws the left edge of the panel, which can be dragged.
+  void edge(Model& model);
+  void inspector(Model& model, std::vector<Command>& commands);
+  void render(Model& model);
+  void volume(Model& model, const Item& item, std::vector<Command>& commands);
+  void object(SceneVolume& volume, const Item& item, std::vector<Command>& commands);
+  void name_row(std::string& name);
+  void grids(Model& model, std::vector<Command>& commands);
   void camera(Model& model, std::vector<Command>& commands);
   /// Draws the saved cameras of the scene.
   void cameras(Model& model);
   void display(Model& model);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
-  /// Draws the list of the scene's objects and the settings of the handles.
-  void items(Model& model);
-  void volumes(Model& model, std::vector<Command>& commands);
-  /// Draws the transform of a volume. transform_index: the selected one of several transforms. number: suffix of the
-  /// labels.
-  void stand(SceneVolume& volume, std::optional<std::size_t> transform_index, const std::string& number);
-  void models(Model& model, std::vector<Command>& commands);
+  /// Draws the transform of a volume.
+  void stand(SceneVolume& volume, std::size_t transform_index);
   // Draws the rows of a transform. Returns the new transform if the user changed it.
-  std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& transform,
-                                                 const std::string& number);
-  void analytic_lights(Model& model);
+  std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& transform);
+  void one_model(SceneModel& one);
+  void other_medium(SceneVolume& other);
+  void analytic_light(cumulet_light_desc& analytic_light);
   void sequence(Model& model, std::vector<Command>& commands);
   /// Draws the timeline below the image: the frames, their states and the current frame.
   void timeline(Model& model, std::vector<Command>& commands);
@@ -63,6 +68,7 @@ class Panel {
   void variant(Model& model);
   void grid(Model& model);
   void sampling(Model& model);
+  void advanced_sampling(Model& model);
   void statistics(const Model& model);
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::SettingInfo info, cumulet_grid_desc& grid);
@@ -77,18 +83,20 @@ class Panel {
 
   Ui ui_;
   Rows rows_{ui_};
+  Outliner outliner_{ui_};
   std::array<RampView, settings::ramps.size()> ramp_views_;
   FileDialog dialog_;
   GridPicker picker_;
+  Question question_;
   bool focus_ = false;
   bool help_was_closed_ = true;
   double time_ = 0.0;
   Rectangle view_;
+  std::optional<Item> seen_;  // selected object in the last frame
   std::string state_;
-  std::map<std::size_t, std::string> names_;        // names of volumes while they are typed
-  std::map<std::size_t, std::string> model_names_;  // names of models while they are typed
-  std::string camera_name_;                         // while it is typed
-  std::string path_;                                // while it is typed
+  std::string name_;         // while it is typed
+  std::string camera_name_;  // while it is typed
+  std::string path_;         // while it is typed
   std::string path_of_;
 };
 

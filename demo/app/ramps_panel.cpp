@@ -24,7 +24,7 @@ void Panel::ramps(Model& model) {
     fit(view, points, field.most);
     if (points.empty()) continue;
     ui_.curve((std::string(info.label) + " curve").c_str(),
-              "Drag to move a point. Click to add one. Right-click or Delete removes it.", points, view, field.heights,
+              "Drag to move a point. Click to add one. Right-click removes it.", points, view, field.heights,
               field.most);
     double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
     if (ui_.numbers(info.point, "Input and output value of the selected point.", chosen, 0.005f * view.max_value))

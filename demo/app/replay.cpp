@@ -169,6 +169,10 @@ class Parser {
       Event lost;
       lost.type = Event::Type::focus_lost;
       event(lost);
+    } else if (command == "close") {
+      Event close;
+      close.type = Event::Type::close;
+      event(close);
     } else if (command == "screenshot" || command == "report") {
       add(command == "report" ? Type::report : Type::screenshot).text = line.quoted();
     } else if (command == "quit") {
@@ -400,6 +404,9 @@ void Recorder::frame(const std::vector<Event>& events, bool loading) {
         break;
       case Event::Type::focus_lost:
         file_ << "focus_lost\n";
+        break;
+      case Event::Type::close:
+        file_ << "close\n";
         break;
     }
   }

@@ -86,6 +86,8 @@ void App::write_report(const std::string& path) const {
   }
   json["neighbours"] = status.neighbours ? status.neighbours->count() : 0;
   json["state"] = last_state_;
+  json["modified"] = model_.modified;
+  json["question"] = panel_.question().is_open() ? Json(panel_.question().title()) : Json();
   json["dialog"] = panel_.dialog_open();
   json["recent"] = model_.preferences.recent;
   json["messages"] = Json::array();

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/type_ptr.hpp>
-#include <type_traits>
+#include <utility>
 
 namespace cumulet::demo {
 namespace {
@@ -15,10 +15,8 @@ using glm::dvec4;
 using Numbers = std::array<double, 16>;
 
 /// Returns a volume of the scene; index 0 is the first volume.
-template <class Scene>
-auto& volume_at(Scene& scene, std::size_t index) {
-  using Volume = std::conditional_t<std::is_const_v<Scene>, const SceneVolume, SceneVolume>;
-  return index == 0 ? static_cast<Volume&>(scene) : scene.others[index - 1];
+const SceneVolume& volume_at(const SceneOptions& scene, std::size_t index) {
+  return index == 0 ? static_cast<const SceneVolume&>(scene) : scene.others[index - 1];
 }
 
 bool has(const SceneOptions& scene, const Item& item) {
@@ -82,23 +80,34 @@ void set_transform(cumulet_light_desc& analytic_light, const dmat4& transform) {
   if (!is_disc) analytic_light.height = stretched(analytic_light.height, higher);
 }
 
-const char* kind_name(cumulet_light_kind kind) {
+std::string kind_name(cumulet_light_kind kind) {
   switch (kind) {
     case CUMULET_LIGHT_POINT:
-      return "point";
+      return "Point light";
     case CUMULET_LIGHT_SPOT:
-      return "spot";
+      return "Spot light";
     case CUMULET_LIGHT_DISK:
-      return "disk";
+      return "Disk light";
     case CUMULET_LIGHT_RECT:
-      return "rectangle";
+      return "Rectangle light";
     case CUMULET_LIGHT_DISTANT:
       break;
   }
-  return "distant";
+  return "Distant light";
 }
 
 }  // namespace
+
+SceneVolume& volume_at(SceneOptions& scene, std::size_t index) {
+  return index == 0 ? static_cast<SceneVolume&>(scene) : scene.others[index - 1];
+}
+
+std::vector<Item> listed_items(const SceneOptions& scene) {
+  std::vector<Item> items = items_of(scene);
+  std::erase_if(items, [](const Item& item) { return item.kind == Item::Kind::analytic_light; });
+  for (std::size_t i = 0; i < scene.analytic_lights.size(); ++i) items.push_back({Item::Kind::analytic_light, i, 0});
+  return items;
+}
 
 std::vector<Item> items_of(const SceneOptions& scene) {
   std::vector<Item> items;
@@ -129,17 +138,94 @@ std::string title_of(const SceneOptions& scene, const Item& item) {
   return "Light " + number;
 }
 
-std::string name_of(const SceneOptions& scene, const Item& item) {
-  const std::string title = title_of(scene, item) + ": ";
+std::string row_text(const SceneOptions& scene, const Item& item) {
   switch (item.kind) {
-    case Item::Kind::volume:
-      return title + volume_at(scene, item.index).label();
+    case Item::Kind::volume: {
+      const SceneVolume& volume = volume_at(scene, item.index);
+      if (volume.transforms.size() < 2) return volume.label();
+      return volume.label() + ", instance " + std::to_string(item.transform_index + 1);
+    }
     case Item::Kind::model:
-      return title + scene.models[item.index].label();
+      return scene.models[item.index].label();
     case Item::Kind::analytic_light:
       break;
   }
-  return title + kind_name(scene.analytic_lights[item.index].kind);
+  return kind_name(scene.analytic_lights[item.index].kind) + " " + std::to_string(item.index + 1);
+}
+
+std::string* name_of_object(SceneOptions& scene, const Item& item) {
+  switch (item.kind) {
+    case Item::Kind::volume:
+      return &volume_at(scene, item.index).name;
+    case Item::Kind::model:
+      return &scene.models[item.index].name;
+    case Item::Kind::analytic_light:
+      break;
+  }
+  return nullptr;
+}
+
+bool* visibility_of(SceneOptions& scene, const Item& item) {
+  switch (item.kind) {
+    case Item::Kind::volume:
+      return &volume_at(scene, item.index).visible;
+    case Item::Kind::model:
+      return &scene.models[item.index].visible;
+    case Item::Kind::analytic_light:
+      break;
+  }
+  return nullptr;
+}
+
+void remove_item(SceneOptions& scene, const Item& item) {
+  const auto erase = [&](auto& all, std::size_t index) { all.erase(all.begin() + static_cast<std::ptrdiff_t>(index)); };
+  switch (item.kind) {
+    case Item::Kind::volume: {
+      auto& transforms = volume_at(scene, item.index).transforms;
+      if (transforms.size() > 1)
+        erase(transforms, item.transform_index);
+      else if (item.index == 0)
+        static_cast<SceneVolume&>(scene) = SceneVolume();
+      else
+        erase(scene.others, item.index - 1);
+      return;
+    }
+    case Item::Kind::model:
+      return erase(scene.models, item.index);
+    case Item::Kind::analytic_light:
+      return erase(scene.analytic_lights, item.index);
+  }
+}
+
+Item duplicate_item(SceneOptions& scene, const Item& item) {
+  const auto copy = [](auto& all, std::size_t index) {
+    auto one = all[index];
+    all.insert(all.begin() + static_cast<std::ptrdiff_t>(index) + 1, std::move(one));
+  };
+  Item made = item;
+  switch (item.kind) {
+    case Item::Kind::volume: {
+      auto& transforms = volume_at(scene, item.index).transforms;
+      if (transforms.size() > 1) {
+        copy(transforms, item.transform_index);
+        ++made.transform_index;
+        return made;
+      }
+      SceneVolume volume = volume_at(scene, item.index);
+      volume.medium.max_bounces = 0;  // the first volume's value applies to all
+      // The first volume has index 0, and the others begin at 1.
+      scene.others.insert(scene.others.begin() + static_cast<std::ptrdiff_t>(item.index), std::move(volume));
+      break;
+    }
+    case Item::Kind::model:
+      copy(scene.models, item.index);
+      break;
+    case Item::Kind::analytic_light:
+      copy(scene.analytic_lights, item.index);
+      break;
+  }
+  ++made.index;
+  return made;
 }
 
 void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index) {

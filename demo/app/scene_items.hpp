@@ -7,6 +7,7 @@
 #include <scene_file.hpp>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 namespace cumulet::demo {
@@ -22,12 +23,30 @@ struct Item {
   bool operator==(const Item&) const = default;
 };
 
-/// Returns all items in the order of the panel.
+/// A part of the scene that exists once.
+enum class Part { render, camera, sun_sky, environment, ground, surfaces };
+/// What the inspector shows.
+using Subject = std::variant<Part, Item>;
+
+/// Returns a volume of the scene; index 0 is the first volume.
+[[nodiscard]] SceneVolume& volume_at(SceneOptions& scene, std::size_t index);
+/// Returns all items, also the lights without a position.
+[[nodiscard]] std::vector<Item> listed_items(const SceneOptions& scene);
+/// Returns all items that can be moved, in the order of the panel.
 [[nodiscard]] std::vector<Item> items_of(const SceneOptions& scene);
 /// Returns the title of an item: "Volume 2", "Volume 1, instance 3", "Model 1", "Light 1".
 [[nodiscard]] std::string title_of(const SceneOptions& scene, const Item& item);
-/// Returns the title with the item's name or kind, for lists.
-[[nodiscard]] std::string name_of(const SceneOptions& scene, const Item& item);
+/// Returns the item's name or kind, for lists.
+[[nodiscard]] std::string row_text(const SceneOptions& scene, const Item& item);
+/// Returns the name that the user can edit; null for lights.
+[[nodiscard]] std::string* name_of_object(SceneOptions& scene, const Item& item);
+/// Returns the visibility that the user can edit; null for lights.
+[[nodiscard]] bool* visibility_of(SceneOptions& scene, const Item& item);
+
+/// Removes an item. Of a volume with several instances only the instance is removed.
+void remove_item(SceneOptions& scene, const Item& item);
+/// Duplicates an item and returns the copy.
+Item duplicate_item(SceneOptions& scene, const Item& item);
 
 /// Updates the selection after an item was removed: clears it, or adjusts the index of a later item.
 void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index);

@@ -96,11 +96,24 @@ void Ui::remember(const char* label, const char* tip) {
     hovered_since_ = time_;
   }
   if (time_ - hovered_since_ < static_cast<double>(tip_delay) || ImGui::IsItemActive()) return;
+  // Beside the panel, so that it does not cover the next rows.
+  const ImGuiWindow& root = *ImGui::GetCurrentWindow()->RootWindow;
+  if (&root == ImGui::FindWindowByName(panel_name))
+    ImGui::SetNextWindowPos({root.Pos.x - px(8.0f), least.y}, ImGuiCond_Always, {1.0f, 0.0f});
   ImGui::BeginTooltip();
   ImGui::PushTextWrapPos(px(300.0f));
   ImGui::TextUnformatted(tip);
   ImGui::PopTextWrapPos();
   ImGui::EndTooltip();
+}
+
+bool Ui::resets(bool differs) const {
+  if (!differs) return false;
+  const ImVec2 corner = ImGui::GetItemRectMin();
+  const float middle = corner.y + 0.5f * ImGui::GetFrameHeight();
+  const ImVec2 dot(corner.x - px(8.0f), middle);
+  ImGui::GetWindowDrawList()->AddCircleFilled(dot, px(2.0f), color_of(ImGuiCol_CheckMark), 12);
+  return ImGui::IsItemHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Right);
 }
 
 bool Ui::section(const char* label, bool open) {
@@ -239,8 +252,9 @@ bool Ui::color(const char* label, const char* tip, float (&rgb)[3]) {
   begin_row(label);
   float shown[3];
   for (std::size_t i = 0; i < 3; ++i) shown[i] = image::srgb_encode(std::clamp(rgb[i], 0.0f, 1.0f));
-  const bool changed = ImGui::ColorEdit3((std::string("##") + label).c_str(), shown,
-                                         ImGuiColorEditFlags_Float | ImGuiColorEditFlags_PickerHueWheel);
+  const bool changed =
+      ImGui::ColorEdit3((std::string("##") + label).c_str(), shown,
+                        ImGuiColorEditFlags_Float | ImGuiColorEditFlags_PickerHueWheel | ImGuiColorEditFlags_NoOptions);
   remember(label, tip);
   if (!changed) return false;
   for (std::size_t i = 0; i < 3; ++i) rgb[i] = image::srgb_decode(std::clamp(shown[i], 0.0f, 1.0f));
@@ -411,9 +425,7 @@ bool Ui::curve(const char* label, const char* tip, settings::RampPoints& points,
     move_point(points, *view.held, area.point_at(mouse));
     changed = true;
   }
-  const bool removes =
-      ImGui::IsMouseClicked(ImGuiMouseButton_Right) || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Delete), false);
-  if (near && !view.held && removes && remove_point(points, *near)) {
+  if (near && !view.held && ImGui::IsMouseClicked(ImGuiMouseButton_Right) && remove_point(points, *near)) {
     view.chosen = std::min(view.chosen, points.size() - 1);
     near.reset();
     changed = true;
@@ -546,6 +558,12 @@ void apply_theme(float scale) {
   set(ImGuiCol_Button, 0x333A44);
   set(ImGuiCol_ButtonHovered, 0x3F4854);
   set(ImGuiCol_ButtonActive, 0x4C5766);
+  set(ImGuiCol_MenuBarBg, 0x23272D);
+  set(ImGuiCol_Tab, 0x23272D);
+  set(ImGuiCol_TabHovered, 0x3A424E);
+  set(ImGuiCol_TabActive, 0x3D5F82);
+  set(ImGuiCol_TabUnfocused, 0x23272D);
+  set(ImGuiCol_TabUnfocusedActive, 0x3D5F82);
   set(ImGuiCol_Header, 0x262B32);
   set(ImGuiCol_HeaderHovered, 0x313842);
   set(ImGuiCol_HeaderActive, 0x3A424E);

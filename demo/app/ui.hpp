@@ -16,6 +16,9 @@
 
 namespace cumulet::demo {
 
+/// Name of the panel's window.
+inline constexpr const char* panel_name = "Settings";
+
 /// An entry of a choice.
 struct Choice {
   const char* text;
@@ -75,6 +78,10 @@ class Ui {
   void plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest);
   /// Shows a name and a value.
   void value_row(const char* label, const std::string& value);
+
+  /// Marks the last control with a dot if its value is not the default. Returns true if the user resets it by a right
+  /// click.
+  [[nodiscard]] bool resets(bool differs) const;
 
   /// Stores the position of the last control and shows its tooltip. Call it for controls that are drawn directly with
   /// ImGui.

@@ -139,12 +139,11 @@ void Window::listen() {
   });
   glfwSetWindowRefreshCallback(
       window, [](GLFWwindow* w) { static_cast<Window*>(glfwGetWindowUserPointer(w))->damaged_ = true; });
+  glfwSetWindowCloseCallback(window, [](GLFWwindow* w) { input_of(w).push(make(Event::Type::close)); });
   glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
     if (focused == GLFW_FALSE) input_of(w).push(make(Event::Type::focus_lost));
   });
 }
-
-bool Window::should_close() const { return glfwWindowShouldClose(window_.get()) == GLFW_TRUE; }
 
 std::pair<int, int> Window::size() const {
   int width = 0;
@@ -219,6 +218,7 @@ void Window::begin_frame(const std::vector<Event>& events, double frame_seconds)
       case Event::Type::button:
       case Event::Type::drop:
       case Event::Type::resize:
+      case Event::Type::close:
         break;
     }
   }

@@ -29,7 +29,6 @@ class Window {
   Window& operator=(const Window&) = delete;
   ~Window();
 
-  [[nodiscard]] bool should_close() const;
   [[nodiscard]] std::pair<int, int> size() const;
   void resize(int width, int height);
   void set_title(const std::string& title);

@@ -197,6 +197,14 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
   }
 }
 
+UpAxis known_up_axis(const std::string& volume_file) {
+  try {
+    return is_z_up(volume_file) ? UpAxis::z : UpAxis::y;
+  } catch (const std::exception&) {  // loading reports the cause
+    return UpAxis::y;
+  }
+}
+
 std::optional<std::string> up_hint(const SceneVolume& volume) {
   if (!volume.is_shown() || volume.up != UpAxis::y || !is_z_up(volume.volume)) return std::nullopt;
   return volume.volume + ": written by Blender or Mantaflow, whose up axis is Z: try --up z";

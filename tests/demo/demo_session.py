@@ -32,7 +32,7 @@ class Session:
     def __init__(self, demo, render, scene, out):
         self.demo, self.renderer, self.scene, self.out = demo, render, scene, out
         self.cumulus, self.explosion = f"{scene}/cumulus.vdb", f"{scene}/explosion_0012.vdb"
-        self.environment = dict(os.environ, XDG_CONFIG_HOME=str(out / "config"))
+        self.environment = dict(os.environ, XDG_CONFIG_HOME=str(out / "config"), XDG_STATE_HOME=str(out / "state"))
 
     def start(self, arguments, **more):
         return subprocess.run([self.demo, *arguments], cwd=self.out, env=self.environment, timeout=900,
@@ -111,6 +111,15 @@ def assert_differ(a, b, area):
 def assert_drawn(picture, area):
     lights = [sum(b) / 3 for b in picture.blocks(area)]
     assert max(lights) - min(lights) > 25, "the picture is blank"
+
+
+def shown(name, control="Scene/"):
+    """Returns the commands that show a part or object in the inspector, or one of its tabs."""
+    return [f'click "{control}{name}"', "frames 2"]
+
+
+def tab(name):
+    return shown(name, "")
 
 
 SETTLE = ["frames 3", "wait loaded", "wait converged"]

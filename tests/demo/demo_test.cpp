@@ -133,6 +133,31 @@ TEST(UndoHistory, FirstCameraIsNoStep) {
   EXPECT_EQ(history.undo(posed)->camera.eye[2], 5.0);
 }
 
+TEST(UndoHistory, StepsHaveNames) {
+  const SceneOptions before = scene_with(1);
+  const auto name = [&](auto change) {
+    SceneOptions after = before;
+    change(after);
+    return change_name(before, after);
+  };
+  EXPECT_EQ(name([](SceneOptions& scene) { scene.medium.density_scale = 7.0; }), "Density scale");
+  EXPECT_EQ(name([](SceneOptions& scene) { scene.volume = "/a/cloud.vdb"; }), "Open cloud.vdb");
+  EXPECT_EQ(name([](SceneOptions& scene) { scene.analytic_lights.emplace_back(); }), "Add light");
+  EXPECT_EQ(name([](SceneOptions& scene) { scene.camera.eye[0] += 1.0; }), "Camera");
+  EXPECT_EQ(name([](SceneOptions& scene) {
+              scene.light.sun_azimuth_degrees = 12.0f;
+              scene.light.sun_elevation_degrees = 34.0f;
+            }),
+            "Sun & sky");
+  History history(before);
+  EXPECT_FALSE(history.undo_name(before));
+  SceneOptions after = before;
+  after.medium.anisotropy = 0.3f;
+  EXPECT_EQ(history.undo_name(after), "Anisotropy");
+  EXPECT_TRUE(history.undo(after));
+  EXPECT_EQ(history.redo_name(), "Anisotropy");
+}
+
 TEST(UndoHistory, IsBounded) {
   History history(scene_with(1));
   for (int i = 2; i < 1000; ++i) history.offer(scene_with(i), false);

@@ -375,14 +375,34 @@ TEST(Items, AreTheObjectsWithAPosition) {
   const SceneOptions scene = scene_of_all();
   const std::vector<Item> items = items_of(scene);
   std::vector<std::string> names;
-  for (const Item& item : items) names.push_back(name_of(scene, item));
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"Volume 1: a.vdb", "Volume 2, instance 1: b.vdb", "Volume 2, instance 2: b.vdb",
-                                      "Model 1: c.glb", "Light 2: rectangle", "Light 3: point"}));
+  for (const Item& item : items) names.push_back(row_text(scene, item));
+  EXPECT_EQ(names, (std::vector<std::string>{"a.vdb", "b.vdb, instance 1", "b.vdb, instance 2", "c.glb",
+                                             "Rectangle light 2", "Point light 3"}));
   EXPECT_TRUE(items_of(SceneOptions()).empty());
   EXPECT_FALSE(transform_of(scene, {Item::Kind::analytic_light, 0, 0})) << "a sun stands nowhere";
   EXPECT_FALSE(transform_of(scene, {Item::Kind::volume, 2, 0}));
   EXPECT_FALSE(transform_of(scene, {Item::Kind::volume, 1, 2}));
+}
+
+TEST(Items, AreRemovedAndDuplicated) {
+  SceneOptions scene = scene_of_all();
+  const std::size_t count = listed_items(scene).size();
+  const Item instance{Item::Kind::volume, 1, 1};
+  EXPECT_EQ(duplicate_item(scene, instance), (Item{Item::Kind::volume, 1, 2}));
+  EXPECT_EQ(scene.others[0].transforms.size(), 3u);
+  remove_item(scene, instance);
+  EXPECT_EQ(scene.others[0].transforms.size(), 2u);
+  EXPECT_EQ(duplicate_item(scene, {Item::Kind::volume, 0, 0}), (Item{Item::Kind::volume, 1, 0}));
+  ASSERT_EQ(scene.others.size(), 2u);
+  EXPECT_EQ(scene.others[0].volume, "a.vdb");
+  EXPECT_EQ(listed_items(scene).size(), count + 1);
+  remove_item(scene, {Item::Kind::volume, 0, 0});
+  EXPECT_TRUE(scene.volume.empty());
+  EXPECT_EQ(duplicate_item(scene, {Item::Kind::model, 0, 0}), (Item{Item::Kind::model, 1, 0}));
+  EXPECT_EQ(scene.models[1].file, "c.glb");
+  remove_item(scene, {Item::Kind::analytic_light, 0, 0});
+  EXPECT_EQ(scene.analytic_lights.size(), 2u);
+  EXPECT_EQ(visibility_of(scene, {Item::Kind::analytic_light, 0, 0}), nullptr);
 }
 
 TEST(Items, TransformsRoundTrip) {

@@ -207,7 +207,10 @@ TEST_F(Info, HintsAtTheUpAxisOfBlenderAndMantaflow) {
     EXPECT_NE(hint->find("--up z"), std::string::npos);
     scene.up = cumulet::demo::UpAxis::z;
     EXPECT_FALSE(cumulet::demo::up_hint(scene));
+    EXPECT_EQ(cumulet::demo::known_up_axis(path(name)), cumulet::demo::UpAxis::z);
   }
+  for (const char* name : {"other.vdb", "missing.vdb"})
+    EXPECT_EQ(cumulet::demo::known_up_axis(path(name)), cumulet::demo::UpAxis::y) << name;
   EXPECT_FALSE(cumulet::demo::up_hint(volume("other.vdb")));
   EXPECT_FALSE(cumulet::demo::up_hint(SceneOptions()));
 }

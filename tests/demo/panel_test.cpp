@@ -3,13 +3,16 @@
 #include <gtest/gtest.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "menus.hpp"
 #include "model.hpp"
 #include "panel.hpp"
+#include "rows.hpp"
 
 namespace {
 
@@ -58,6 +61,45 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     ImGui::Render();
   }
 
+  void check_controls() {
+    const auto& controls = panel_.ui().controls();
+    const std::set<std::string> without_tip = {"File",      "Edit",     "View",       "Render",       "Help",
+                                               "Image",     "Sampling", "Advanced",   "Model",        "Triangles",
+                                               "Grid data", "Levels",   "Cell count", "Active voxels"};
+    EXPECT_GT(controls.size(), 20u);
+    const ImVec2 screen = ImGui::GetIO().DisplaySize;
+    for (const auto& [name, control] : controls) {
+      EXPECT_EQ(control.has_tip, !without_tip.contains(name)) << name;
+      const Rectangle& a = control.rectangle;
+      EXPECT_GE(a.x, 0.0) << name;
+      EXPECT_LE(a.x + a.width, static_cast<double>(screen.x) + 0.5) << name;
+      EXPECT_GT(a.width, 2.0) << name;
+      for (const auto& [other, control_b] : controls) {
+        const Rectangle& b = control_b.rectangle;
+        const bool apart =
+            a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
+        // The toolbar is fixed; scrolled controls pass below it.
+        if (name < other && control.in_view && control_b.in_view) {
+          EXPECT_TRUE(apart) << name << " and " << other;
+        }
+      }
+    }
+  }
+
+  /// Clicks the middle of a control.
+  void click(const std::string& label, ImGuiMouseButton button = ImGuiMouseButton_Left) {
+    const auto rectangle = panel_.ui().find(label);
+    ASSERT_TRUE(rectangle) << label;
+    const ImVec2 middle(static_cast<float>(rectangle->x + rectangle->width / 2),
+                        static_cast<float>(rectangle->y + rectangle->height / 2));
+    frame(middle);
+    ImGui::GetIO().MouseDown[button] = true;
+    frame(middle);
+    ImGui::GetIO().MouseDown[button] = false;
+    frame(middle);
+    frame(middle);
+  }
+
   Model model_;
   Panel panel_;
   std::vector<Command> commands_;
@@ -65,30 +107,18 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
 };
 
 TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnArea) {
-  frame();
-  frame();
-  const auto& controls = panel_.ui().controls();
-  const std::set<std::string> without_tip = {
-      "Scene",     "File",          "Volumes",  "Volume 1",   "Display",     "Sun & sky",     "Lights",
-      "Medium",    "Models",        "Surfaces", "Model",      "Environment", "Image",         "Triangles",
-      "Grid",      "Camera",        "Sampling", "Statistics", "Cell count",  "Levels",        "Build",
-      "Grid data", "Active voxels", "Trace",    "GPU memory", "Renderer",    "Steps per path"};
-  EXPECT_GT(controls.size(), 50u);
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  for (const auto& [name, control] : controls) {
-    EXPECT_EQ(control.has_tip, !without_tip.contains(name)) << name;
-    const Rectangle& a = control.rectangle;
-    EXPECT_GE(a.x, 0.0) << name;
-    EXPECT_LE(a.x + a.width, static_cast<double>(screen.x) + 0.5) << name;
-    EXPECT_GT(a.width, 2.0) << name;
-    for (const auto& [other, control_b] : controls) {
-      const Rectangle& b = control_b.rectangle;
-      const bool apart = a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
-      // The toolbar is fixed; scrolled controls pass below it.
-      if (name < other && control.in_view && control_b.in_view) {
-        EXPECT_TRUE(apart) << name << " and " << other;
-      }
-    }
+  model_.scene.volume = "/a/cloud.vdb";
+  model_.scene.surfaces = "/a/town.glb";
+  model_.scene.models.push_back({"/a/tree.glb"});
+  std::vector<Subject> subjects = {Part::render,      Part::camera, Part::sun_sky,
+                                   Part::environment, Part::ground, Part::surfaces};
+  for (const Item& item : listed_items(model_.scene)) subjects.emplace_back(item);
+  EXPECT_EQ(subjects.size(), 10u);
+  for (const Subject& subject : subjects) {
+    select(model_, subject);
+    frame();
+    frame();
+    check_controls();
   }
 }
 
@@ -102,6 +132,7 @@ TEST_P(PanelTest, LabelsFitBesideTheirControls) {
 }
 
 TEST_P(PanelTest, ThumbnailRotatesTheEnvironment) {
+  select(model_, Part::environment);
   panel_.ui().bring_into_view("Environment view");
   for (int i = 0; i < 5; ++i) frame();
   const auto rectangle = panel_.ui().find("Environment view");
@@ -183,20 +214,80 @@ TEST_P(PanelTest, SceneWithOnlyAModelIsListedAndSaved) {
   EXPECT_NE(panel_.state().find("saving picture.png"), std::string::npos) << panel_.state();
 }
 
-TEST_P(PanelTest, ButtonsIssueTheirCommands) {
+TEST_P(PanelTest, MenusIssueTheirCommands) {
   frame();
   frame();
-  const Rectangle rectangle = *panel_.ui().find("Open");
-  const ImVec2 middle(static_cast<float>(rectangle.x + rectangle.width / 2),
-                      static_cast<float>(rectangle.y + rectangle.height / 2));
-  ImGuiIO& io = ImGui::GetIO();
-  frame(middle);
-  io.MouseDown[0] = true;
-  frame(middle);
-  io.MouseDown[0] = false;
-  frame(middle);
+  click("File");
+  click("File/Open...");
   ASSERT_EQ(commands_.size(), 1u);
   EXPECT_EQ(commands_[0].action, Action::open_dialog);
+  model_.undo = "Density scale";
+  click("Edit");
+  click("Edit/Undo");
+  ASSERT_EQ(commands_.size(), 2u);
+  EXPECT_EQ(commands_[1].action, Action::undo);
+}
+
+TEST_P(PanelTest, OutlinerSelectsHidesAndDeletes) {
+  model_.scene.volume = "/a/cloud.vdb";
+  frame();
+  frame();
+  EXPECT_EQ(subject_of(model_), Subject(Item{Item::Kind::volume, 0, 0})) << "the first object, until the user selects";
+  EXPECT_TRUE(panel_.ui().controls().contains("Density scale"));
+  EXPECT_FALSE(model_.chosen);
+  click("Scene/Sun & sky");
+  EXPECT_TRUE(panel_.ui().controls().contains("Sun dial"));
+  EXPECT_FALSE(panel_.ui().controls().contains("Density scale"));
+  panel_.ui().bring_into_view("Eye/Volume 1");
+  for (int i = 0; i < 3; ++i) frame();
+  click("Eye/Volume 1");
+  EXPECT_FALSE(model_.scene.visible);
+  EXPECT_EQ(subject_of(model_), Subject(Part::sun_sky)) << "an eye selects nothing";
+}
+
+TEST_P(PanelTest, RightClickResetsASetting) {
+  select(model_, Part::render);
+  panel_.ui().bring_into_view("Exposure");
+  for (int i = 0; i < 4; ++i) frame();
+  model_.scene.display.exposure_stops = 2.0f;
+  click("Exposure", ImGuiMouseButton_Right);
+  EXPECT_EQ(model_.scene.display.exposure_stops, 0.0f);
+  select(model_, Part::sun_sky);
+  panel_.ui().bring_into_view("Turbidity");
+  for (int i = 0; i < 4; ++i) frame();
+  model_.scene.light.sky = CUMULET_SKY_PHYSICAL;
+  model_.scene.light.turbidity = 9.0f;
+  frame();
+  panel_.ui().bring_into_view("Turbidity");
+  for (int i = 0; i < 4; ++i) frame();
+  click("Turbidity", ImGuiMouseButton_Right);
+  EXPECT_EQ(model_.scene.light.turbidity, default_of<cumulet_sun_sky_desc>().turbidity);
+}
+
+TEST_P(PanelTest, EdgeChangesTheWidth) {
+  frame();
+  frame();
+  const Rectangle edge = *panel_.ui().find("Panel edge");
+  const auto y = static_cast<float>(edge.y + edge.height / 2);
+  ImGuiIO& io = ImGui::GetIO();
+  const auto drag = [&](float width) {
+    const Rectangle from = *panel_.ui().find("Panel edge");
+    const ImVec2 start(static_cast<float>(from.x + from.width / 2), y);
+    frame(start);
+    io.MouseDown[0] = true;
+    frame(start);
+    frame({io.DisplaySize.x - panel_.ui().px(width), y});
+    io.MouseDown[0] = false;
+    frame({io.DisplaySize.x - panel_.ui().px(width), y});
+    frame();
+    frame();
+  };
+  drag(300.0f);
+  EXPECT_EQ(model_.preferences.panel_width, 300.0f);
+  drag(100.0f);
+  EXPECT_EQ(model_.preferences.panel_width, 280.0f);
+  drag(900.0f);
+  EXPECT_EQ(model_.preferences.panel_width, 480.0f);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
@@ -204,5 +295,27 @@ INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
                                            std::make_pair(2.0f, ImVec2(1680, 1040)),
                                            std::make_pair(1.0f, ImVec2(640, 400)),
                                            std::make_pair(1.25f, ImVec2(1024, 3000))));
+
+TEST(Menus, ReachEveryAction) {
+  // Actions of dialogs, of the outliner and of Escape.
+  const std::set<Action> elsewhere = {
+      Action::add_volume,      Action::add_model, Action::save_scene_as, Action::save_png,    Action::save_exr,
+      Action::discard_changes, Action::recover,   Action::cancel,        Action::choose_grid, Action::discard_recovery};
+  for (int i = 0; i <= static_cast<int>(Action::quit); ++i) {
+    const auto action = static_cast<Action>(i);
+    const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {
+      return std::ranges::any_of(
+          menu.entries, [&](const MenuEntry& entry) { return *entry.label != '\0' && entry.command.action == action; });
+    });
+    EXPECT_NE(listed, elsewhere.contains(action)) << i;
+  }
+}
+
+TEST(Menus, ShowTheKeys) {
+  EXPECT_EQ(keys_of({Action::save_scene_dialog}), "Ctrl+Shift+S");
+  EXPECT_EQ(keys_of({Action::step, "", -1}), ",");
+  EXPECT_EQ(keys_of({Action::view, "", CUMULET_VIEW_STEPS}), "3");
+  EXPECT_EQ(keys_of({Action::add_light}), "");
+}
 
 }  // namespace

@@ -16,8 +16,9 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import session_content
 import session_input
 import session_light
+import session_saving
 import spans
-from demo_session import assert_alike, assert_differ, assert_drawn, look, Session, SETTLE, shot, SIZE
+from demo_session import assert_alike, assert_differ, assert_drawn, look, Session, SETTLE, shot, shown, SIZE, tab
 
 
 def test_orbit_undo(s):
@@ -72,8 +73,8 @@ def test_region(s):
 def test_change(s):
     s.play("replay", [*SETTLE, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5', *SETTLE,
                       *shot("thin"), "key ctrl+z", *SETTLE, *shot("thick"), "key n", *SETTLE, *shot("wide"), "key n",
-                      'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *SETTLE, *shot("sun"), 'click "Tone map"',
-                      "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), 'click "Threshold"',
+                      *shown("Sun & sky"), 'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *SETTLE, *shot("sun"), *shown("Render"), 'click "Tone map"',
+                      "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), *tab("Advanced"), 'click "Threshold"',
                       'drag "Threshold" to "Threshold" 0.95 0.5', *SETTLE, *shot("coarse"), "key 2", *SETTLE, *shot("cells"),
                       "key 3", *SETTLE, *shot("steps"), "key 5", *SETTLE, *shot("wireframe"), "key 1"],
            "--volume", s.cumulus)
@@ -122,7 +123,7 @@ def roughness(picture, area):
 def test_first_start(s):
     """The panel's settings apply from the first image on: Denoise is Fast, and the image has no noise."""
     choose = lambda name: ['click "Denoise"', "frames 2", f'click "Denoise/{name}"', "frames 3", "wait converged", "frames 20"]
-    s.play("replay", ["wait loaded", "wait converged", "frames 20", *shot("first"), *choose("Off"), *shot("off"), *choose("Fast"),
+    s.play("replay", ["wait loaded", "wait converged", "frames 20", *shot("first"), *shown("Render"), *choose("Off"), *shot("off"), *choose("Fast"),
                       *shot("again")], "--volume", s.cumulus, "--spp", "4", "--denoise", "fast")
     first, report, area = look(s, "first")
     off, again = look(s, "off")[0], look(s, "again")[0]
@@ -173,7 +174,7 @@ def test_dropped_together(s):
     there = ["frames 3", "wait loaded", "frames 2"]
     s.play("several", ["frames 3", f'drop "{mountains}" "{s.cumulus}" "{s.explosion}"', *there, *shot("several"),
                        f'drop "{s.out}/blast_3.vdb" "{s.out}/blast_1.vdb"', *there, "key escape", "key .", *there, *shot("frames"),
-                       'click "Up axis"', "frames 2", 'click "Up axis/Z"', *there, "key ctrl+s", "frames 2", "key ctrl+a",
+                       *tab("Grids"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', *there, "key ctrl+s", "frames 2", "key ctrl+a",
                        'text "saved.json"', "key enter", *there, *shot("saved")],
            "--spp", "1")
     several, frames = s.report("several"), s.report("frames")
@@ -183,7 +184,7 @@ def test_dropped_together(s):
     assert pathlib.Path(frames["volumes"][1]["file"]).name == "explosion_0012.vdb", frames["volumes"]
     saved = s.report("saved")
     assert saved["sequence"]["frame"] == frames["sequence"]["frame"] == 2, "another up axis keeps the frame"
-    assert frames["title"] == "blast_#.vdb - Cumulet" and saved["title"] == "saved.json - Cumulet", saved["title"]
+    assert frames["title"] == "*blast_#.vdb - Cumulet" and saved["title"] == "saved.json - Cumulet", saved["title"]
 
 
 def test_save_whole(s):
@@ -216,7 +217,7 @@ def test_save_whole(s):
 
 def test_scene_file(s):
     # A camera is saved, left and selected again.
-    view = ['click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
+    view = [*shown("Camera"), 'click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
             "frames 3", 'click "Saved camera"', "frames 2", 'click "Saved camera/near"', "frames 3"]
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
                     *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
@@ -280,8 +281,6 @@ def test_unchanged(s):
 def test_record(s):
     steps = ["wait loaded", "drag viewport 0.4 0.5 to viewport 0.6 0.6", "frames 5", "key ]", 'click "View"', "frames 3",
              'click "View/Steps"', "frames 3", "key ctrl+o", "frames 3", f'text "{s.explosion}"', "key enter", "wait loaded"]
-    # The window is high enough to show View. A click by name scrolls the panel, but the recorder records only a user's
-    # scrolling.
     high = ["--size", "640x500"]
     s.play("replay", [*steps, *shot("played")], "--volume", s.cumulus, "--record", "recorded.replay", size=high)
     recorded = (s.out / "recorded.replay").read_text().splitlines()
@@ -385,12 +384,12 @@ def test_failures(s):
 
 
 def test_settings(s):
-    s.play("replay", ["wait loaded", 'click "Navigation"', "frames 2", 'click "Navigation/Maya"', "frames 2"], "--volume",
+    s.play("replay", ["wait loaded", *shown("Camera"), 'click "Navigation"', "frames 2", 'click "Navigation/Maya"', "frames 2"], "--volume",
            s.cumulus)
     file = s.out / "config/cumulet/demo.json"
     kept = json.loads(file.read_text())
     assert kept["navigation"] == "maya" and kept["recent"][0].endswith("cumulus.vdb"), kept
-    s.play("again", ["wait loaded", 'click "Recent"', "frames 2", 'click "Recent/cumulus.vdb"', "wait loaded", *shot("recent"),
+    s.play("again", ["wait loaded", *tab("File"), *tab("File/Open recent"), 'click "Recent/cumulus.vdb"', "wait loaded", *shot("recent"),
                      "drag viewport 0.3 0.5 to viewport 0.6 0.5", "frames 2", *shot("plain"), "press alt",
                      "drag viewport 0.3 0.5 to viewport 0.6 0.5", "release alt", "frames 2", *shot("alt")])
     assert s.report("recent")["has_volume"]
@@ -415,7 +414,7 @@ def main():
     try:
         with os.fdopen(read) as display:
             session.environment["DISPLAY"] = ":" + display.readline().strip()
-        tests = {**vars(session_content), **vars(session_input), **vars(session_light), **globals()}
+        tests = {**vars(session_content), **vars(session_input), **vars(session_light), **vars(session_saving), **globals()}
         tests[f"test_{test}"](session)
     finally:
         server.terminate()

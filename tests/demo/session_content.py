@@ -6,7 +6,7 @@ import shutil
 import struct
 import subprocess
 
-from demo_session import ALIKE, assert_alike, assert_differ, assert_drawn, look, SETTLE, shot
+from demo_session import ALIKE, assert_alike, assert_differ, assert_drawn, look, SETTLE, shot, shown, tab
 from png import difference
 
 
@@ -19,13 +19,13 @@ def test_volumes(s):
     (s.out / "two.json").write_text(json.dumps({"cumulet_scene": 2, "volumes": volumes, "camera": camera}))
     there = ["wait loaded", "wait converged"]
     s.play("volumes",
-           [*there, *shot("both"),
-            'click "Visible 2"', *there, *shot("first"),
+           ["key q", *there, *shot("both"),
+            'click "Eye/Volume 2"', *there, *shot("first"),
             "key ctrl+z", *there, *shot("again"),
-            'click "Visible 1"', *there, *shot("second"),
-            "key ctrl+z", 'click "Remove volume 2"', *there, *shot("removed"),
-            "key ctrl+z", 'click "Copy volume 2"', *there,
-            'drag "Scale 3" to "Scale 3" 0.55 0.5', *there, 'click "Add volume"', "frames 2", "key escape", *there,
+            'click "Eye/Volume 1"', *there, *shot("second"),
+            "key ctrl+z", *shown("Volume 2"), "key delete", *there, *shot("removed"),
+            "key ctrl+z", *shown("Volume 2"), "key ctrl+d", *there, *tab("Object"),
+            'drag "Scale" to "Scale" 0.55 0.5', *there, 'click "Add volume"', "frames 2", "key escape", *there,
             *shot("copied")],
            "--scene", "two.json")
     both, _, area = look(s, "both")
@@ -126,7 +126,7 @@ def test_timeline(s):
     quick = ["--spp", "2", "--albedo", "0.5,0.5,0.5", "--max-bounces", "2"]
     size = ["--size", "640x260"]
     s.play("timeline",
-           [*there, *shot("alone"), 'click "Play the sequence"', *there, *shot("opened"),
+           [*there, *shot("alone"), *tab("Sequence"), 'click "Play the sequence"', *there, *shot("opened"),
             "key .", *there, *shot("next"), "key ,", "key ,", *there, *shot("missing"),
             "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Repeat"', "frames 2",
             'click "Repeat/Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
@@ -192,9 +192,9 @@ def test_timeline(s):
 
 def test_surfaces(s):
     mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
-    s.play("replay", [*SETTLE, *shot("first"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
+    s.play("replay", [*SETTLE, *shot("first"), *shown("Surfaces"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
                       *shot("soft"), 'click "Surface lighting"', "frames 2", 'click "Surface lighting/Rasterized"', *SETTLE, *shot("none"),
-                      'click "Remove surfaces"', *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
+                      "key delete", *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
            "--volume", s.cumulus, "--gltf", mountains, "--spp", "2")
     first, report, area = look(s, "first")
     assert report["scene"]["surfaces"]["indirect_roughness"] == 0
@@ -248,9 +248,9 @@ def test_bad_files(s):
 
 def test_grids(s):
     """The panel lists a file's grids and shows each of them, with a suitable density scale."""
-    s.play("replay", ["wait loaded", *shot("opened"), 'click "Inspect grids"', "frames 2", "idle 3", *shot("picker"),
+    s.play("replay", ["wait loaded", *shot("opened"), *tab("Grids"), 'click "Inspect grids"', "frames 2", "idle 3", *shot("picker"),
                       'click "Grids/temperature"', "frames 3", "wait loaded", *shot("temperature"),
-                      'drag "Density scale" 0.5 0.5 to "Density scale" 0.9 0.5', "frames 3", *shot("dense"),
+                      *tab("Material"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.9 0.5', "frames 3", *shot("dense"),
                       'click "Auto density"', "frames 5", *shot("auto"), "key ctrl+z", "frames 5", *shot("undone"),
                       "key ctrl+z", "frames 3", "key ctrl+z", "frames 3", "wait loaded", *shot("back")],
            "--density-scale", "auto", "--volume", s.explosion)
@@ -290,7 +290,7 @@ def test_unnamed_grids(s):
 
 def test_up_axis(s):
     """The up axis is selected, displayed, saved and undone; cumulet-render shows the same image."""
-    s.play("replay", ["wait loaded", "wait converged", *shot("y"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
+    s.play("replay", ["wait loaded", "wait converged", *shot("y"), *tab("Grids"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
                       "wait loaded", "wait converged", *shot("z"), "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"',
                       "key enter", "frames 3", "key escape", "frames 2", "key ctrl+z", "frames 3", "wait loaded",
                       "wait converged", *shot("back")],

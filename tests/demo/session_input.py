@@ -3,16 +3,16 @@
 import threading
 import time
 
-from demo_session import assert_differ, look, Screen, shot
+from demo_session import assert_differ, look, Screen, shot, shown, tab
 
 
 def test_keyboard(s):
-    s.play("replay", ["key f2", "frames 2", "key space", "frames 3", *shot("dialog"), "key ctrl+a", f'text "{s.cumulus}"',
+    s.play("replay", ["key f2", "frames 2", "key down", "frames 2", "key space", "frames 2", "key ctrl+o", "frames 3", *shot("dialog"), "key ctrl+a", f'text "{s.cumulus}"',
                       "key enter", "wait loaded", "wait converged", *shot("loaded"), "key f1", "frames 3", *shot("help"),
                       "key escape", "frames 2", "key 4", "key m", "frames 3", "wait loaded", *shot("keys"), "key t",
                       "frames 20", *shot("turning"), "key t", "key g", "frames 2", "press w", "frames 10", "release w",
                       "frames 2", *shot("flown"), "key g", "key right", "key right", "frames 2", *shot("turned"),
-                      "key f2", "frames 2", "press tab", "release tab", "frames 2", *shot("panel"), "key ctrl+q", "frames 50",
+                      "key f2", "frames 2", "press tab", "release tab", "frames 2", *shot("panel"), "key ctrl+q", "frames 2", 'click "Question/Discard"', "frames 50",
                       'screenshot "never.png"'])
     for name in ("dialog", "help"):
         assert_differ(s.picture(name), s.picture("loaded"), look(s, name)[2])
@@ -24,6 +24,45 @@ def test_keyboard(s):
         assert a != b, eyes
     assert s.report("turning")["undo_steps"] == s.report("keys")["undo_steps"], "a turntable makes no steps"
     assert not (s.out / "never.png").exists(), "Ctrl+Q quits"
+
+
+def test_outliner(s):
+    """The outliner duplicates and deletes objects, each as one step. A right click resets a setting, and the edge of
+    the panel sets its width."""
+    there = ["frames 2", "wait loaded", "frames 2"]
+    s.play("replay", ["wait loaded", *shown("Render"), 'drag "Exposure" to "Exposure" 0.7 0.5', *there, 'report "exposed.json"',
+                      'click "Exposure" right', *there, 'report "reset.json"', "key ctrl+z", *there, 'report "again.json"',
+                      *shown("Volume 1"), "key ctrl+d", *there, 'report "two.json"', "key delete", *there, 'report "one.json"',
+                      "key ctrl+z", *there, *shown("Volume 1"), *tab("View"), "key escape", "frames 2", 'report "escaped.json"',
+                      *tab("Edit"), *shot("menu"), 'click "Edit/Undo"', *there, 'report "undone.json"',
+                      *tab("View"), *tab("View/Scale 150 %"), *there, *shot("scaled"),
+                      *tab("View"), *tab("View/Scale 100 %"), *there,
+                      'drag "Panel edge" to 700 300', *there, *shot("wide")],
+           "--volume", s.cumulus, "--spp", "1", size=["--size", "1100x700"])
+    exposure = lambda name: s.report(name)["scene"]["display"]["exposure_stops"]
+    steps = lambda name: s.report(name)["undo_steps"]
+    volumes = lambda name: len(s.report(name)["volumes"])
+    assert exposure("exposed") > 1 and exposure("reset") == 0 and steps("reset") == 2
+    assert exposure("again") == exposure("exposed")
+    assert [volumes(name) for name in ("again", "two", "one", "undone")] == [1, 2, 1, 1]
+    assert [steps(name) for name in ("again", "two", "one", "undone")] == [1, 2, 3, 1]
+    assert s.report("escaped")["chosen"] == "Volume 1", "Escape only closes the menu"
+    width = lambda name: 1100 - s.report(name)["viewport"][2]
+    assert [width(name) for name in ("menu", "scaled", "wide")] == [372, 550, 400], "at most half of the window"
+
+
+def test_layout(s):
+    """Takes screenshots of the parts of the interface for inspection."""
+    for name, size in (("large", "1440x900"), ("small", "900x600")):
+        parts = [word for part in ("Render", "Camera", "Sun & sky", "Environment", "Ground", "Volume 1")
+                 for word in (*shown(part), "frames 3", *shot(f"{name}_{part.split()[0].lower()}"))]
+        s.play(name, ["frames 3", *shot(f"{name}_empty"), f'drop "{s.explosion}"', "wait loaded", "frames 40", *parts,
+                      'click "Add light"', "frames 5", *shot(f"{name}_light"), *tab("File"), *shot(f"{name}_menu"), "key escape",
+                      "close", "frames 3", *shot(f"{name}_question")], "--spp", "8", "--denoise", "fast", size=["--size", size])
+        for part in ("empty", "render", "light"):
+            report, picture = s.report(f"{name}_{part}"), s.picture(f"{name}_{part}")
+            x, y, width, height = report["viewport"]
+            assert y > 0 and 0 < picture.width - x - width <= 480 and y + height == picture.height, report["viewport"]
 
 
 REFINING = ["--spp", "60000", "--volume"]  # the rendering never finishes
@@ -39,10 +78,10 @@ def test_typing(s):
         s.hand("type", "--delay", "40", text)
         typed = time.monotonic()
         while time.monotonic() - typed < 6:
-            seen.append((time.monotonic() - typed, s.screen(640, 60, 360, 60)))
+            seen.append((time.monotonic() - typed, s.screen(640, 30, 360, 560)))
             time.sleep(0.02)
 
-    s.play_live("replay", ["wait loaded", "frames 5", 'click "Volume"', "frames 2", "key ctrl+a", "frames 2",
+    s.play_live("replay", ["wait loaded", "frames 5", *tab("Object"), 'click "Volume file"', "frames 2", "key ctrl+a", "frames 2",
                            "press backspace", "release backspace", 'report "live.json"', "idle 20", *shot("typed")],
                 hand, *REFINING, s.cumulus, size=["--size", "1012x600"])
 

@@ -1,0 +1,127 @@
+// The inspector of the panel, which shows the settings of the selected part or object only.
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "panel.hpp"
+
+namespace cumulet::demo {
+
+void Panel::inspector(Model& model, std::vector<Command>& commands) {
+  const Subject subject = subject_of(model);
+  if (const Item* item = std::get_if<Item>(&subject)) {
+    switch (item->kind) {
+      case Item::Kind::volume:
+        return volume(model, *item, commands);
+      case Item::Kind::model:
+        return one_model(model.scene.models[item->index]);
+      case Item::Kind::analytic_light:
+        return analytic_light(model.scene.analytic_lights[item->index]);
+    }
+  }
+  switch (std::get<Part>(subject)) {
+    case Part::render:
+      return render(model);
+    case Part::camera:
+      return camera(model, commands);
+    case Part::sun_sky:
+      return light(model);
+    case Part::environment:
+      return environment(model, commands);
+    case Part::ground:
+      return ground(model);
+    case Part::surfaces:
+      return surfaces(model);
+  }
+}
+
+void Panel::render(Model& model) {
+  const auto section = [this](const char* label, bool open, const auto& content) {
+    if (!ui_.section(label, open)) return;
+    ImGui::Spacing();
+    content();
+    ImGui::Dummy({0.0f, ui_.px(6.0f)});
+  };
+  section("Image", true, [&] { display(model); });
+  section("Sampling", true, [&] { sampling(model); });
+  section("Advanced", false, [&] {
+    advanced_sampling(model);
+    Ui::heading("Grid");
+    grid(model);
+    Ui::heading("Statistics");
+    statistics(model);
+  });
+}
+
+void Panel::volume(Model& model, const Item& item, std::vector<Command>& commands) {
+  if (!ImGui::BeginTabBar("volume")) return;
+  const auto tab = [this](const char* label, const char* tip, const auto& content) {
+    const bool open = ImGui::BeginTabItem(label);
+    ui_.remember(label, tip);
+    if (!open) return;
+    ImGui::Spacing();
+    content();
+    ImGui::EndTabItem();
+  };
+  SceneVolume& shown = volume_at(model.scene, item.index);
+  const bool first = item.index == 0;
+  tab("Material", "How the medium scatters, absorbs and emits light.", [&] {
+    if (first)
+      medium(model, commands);
+    else
+      other_medium(shown);
+  });
+  tab("Object", "Name and transform.", [&] { object(shown, item, commands); });
+  if (first) tab("Grids", "The grids of the file and its up axis.", [&] { grids(model, commands); });
+  if (first && (model.status.play || model.status.neighbours))
+    tab("Sequence", "Playback of numbered files.", [&] { sequence(model, commands); });
+  ImGui::EndTabBar();
+}
+
+void Panel::object(SceneVolume& volume, const Item& item, std::vector<Command>& commands) {
+  if (item.index == 0) {
+    if (path_of_ != volume.volume) path_ = path_of_ = volume.volume;
+    if (ui_.text("Volume file", "Press Enter to open another file in place of this one.", "Path of a file", path_))
+      commands.push_back({Action::open, path_});
+  } else {
+    ui_.value_row("Volume file", volume.volume);
+  }
+  name_row(volume.name);
+  ui_.checkbox("Visible", "If off, the object is hidden and casts no shadow.", volume.visible);
+  stand(volume, item.transform_index);
+}
+
+void Panel::name_row(std::string& name) {
+  if (!ImGui::IsAnyItemActive()) name_ = name;
+  if (ui_.text("Name", "Name in the scene file. Press Enter to accept.", "name of the file", name_)) name = name_;
+}
+
+void Panel::grids(Model& model, std::vector<Command>& commands) {
+  std::vector<Choice> grids;
+  std::vector<std::string> tips;
+  tips.reserve(model.grids.size());
+  int now = -1;
+  for (std::size_t i = 0; i < model.grids.size(); ++i) {
+    const GridInfo& grid = model.grids[i];
+    tips.push_back(grid.refusal.empty() ? grid.type : grid.type + ": " + grid.refusal);
+    grids.push_back({grid.name.c_str(), static_cast<int>(i), tips.back().c_str()});
+    if (grid.name == model.status.grid) now = static_cast<int>(i);
+  }
+  if (!grids.empty() && ui_.choose("Grid name", "Density grid: a scalar fog volume of the file.", grids, now))
+    model.scene.grid_name = model.grids[static_cast<std::size_t>(now)].name;
+  int up = static_cast<int>(model.scene.up);
+  if (ui_.choose("Up axis", "Up axis of the volume. The file is loaded again and framed.",
+                 {{"Y", static_cast<int>(UpAxis::y), "Y is up."},
+                  {"Z", static_cast<int>(UpAxis::z), "Z is up, as in files of Blender and Mantaflow."}},
+                 up))
+    commands.push_back({Action::choose_up, {}, up});
+  if (ui_.button("Inspect grids", "Shows type, voxels, range and histogram of each grid, and lets you select one.",
+                 {-1.0f, 0.0f}))
+    commands.push_back({Action::grids_dialog});
+}
+
+}  // namespace cumulet::demo
