@@ -104,9 +104,12 @@ std::string keys_of(const Command& command) {
   if ((found->modifiers & modifier_ctrl) != 0) keys += "Ctrl+";
   if ((found->modifiers & modifier_alt) != 0) keys += "Alt+";
   if ((found->modifiers & modifier_shift) != 0) keys += "Shift+";
-  std::string name = key_name(found->key);
-  if (found->key == GLFW_KEY_COMMA) name = ",";
-  if (found->key == GLFW_KEY_PERIOD) name = ".";
+  const auto name_of = [](int key) -> std::string {
+    if (key == GLFW_KEY_COMMA) return ",";
+    if (key == GLFW_KEY_PERIOD) return ".";
+    return key_name(key);
+  };
+  std::string name = name_of(found->key);
   if (!name.empty() && name[0] >= 'a' && name[0] <= 'z') name[0] = static_cast<char>(name[0] - 'a' + 'A');
   return keys + name;
 }
