@@ -62,8 +62,8 @@ void add_peer_options(CLI::App& app, Options& options) {
       "constant ones; can be repeated");
   app.add_option(
       "--block-bytes", options.block_bytes,
-      "With --peers: what storage blocks are taken to hold, not what the driver says (llvmpipe's 128 MiB are "
-      "not where they end)");
+      "With --peers: assumed size of storage blocks, instead of the driver's limit (llvmpipe reports 128 MiB "
+      "and accepts more)");
   app.add_flag("--by-clock", options.by_clock,
                "With --peers: the clock's time, as of a GPU, instead of the processors'");
 }

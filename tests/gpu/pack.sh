@@ -67,7 +67,7 @@ mkdir -p "$out/golden"
 (cd "$build" && ctest --show-only=json-v1 -R '^image\.') |
   python3 -B "$here/pictures.py" "$out/golden" >"$out/golden/pictures.txt"
 
-# The same images of this machine's driver with another seed: their errors show what noise alone does.
+# Renders the same images with this machine's driver and another seed. Their errors come from noise alone.
 if [ -z "$links" ]; then
   "$build/bin/cumulet-scene" "$stage/scene" --voxels 150000 --frame 12 >"$stage/scene.log"
   while IFS=$'\t' read -r name limits flags; do

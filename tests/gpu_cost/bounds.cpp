@@ -43,8 +43,8 @@ Bounds Bounds::read(const std::string& path) {
 
 void Bounds::write(const std::string& path) const {
   std::ofstream file(path);
-  file << "# What a kernel may cost at most (of waves: at least) on a family of GPUs. README.md has the command that "
-          "writes this file.\n";
+  file << "# Limits of the cost of each kernel on a family of GPUs: maxima, of waves minima. README.md has the command "
+          "that writes this file.\n";
   if (!driver.empty()) file << "driver " << driver << '\n';
   file << "# family  registers  spilled  spilled scalars  scratch  shared  waves  code  kernel\n";
   for (const auto& [key, cost] : bounds_) {

@@ -1,5 +1,5 @@
 // The kernel of the paper as a peer: Algorithm 1 of Benyoub and Dupuy, "Adaptive Tetrahedral Grids for Volumetric
-// Path-Tracing", SIGGRAPH Talks 2025, written anew on our cells. In a copy of glsl/ it replaces run.glsl
+// Path-Tracing", SIGGRAPH Talks 2025, as our own code for our cells. In a copy of glsl/ it replaces run.glsl
 // (tests/gpu/shader_variants.py).
 //
 // - Cells have one density. Their record of 36 bytes has the content of ours: neighbors, planes and density.
