@@ -152,6 +152,13 @@ std::optional<LoadedVolume> Builder::take_loaded() {
   return std::exchange(loaded_, std::nullopt);
 }
 
+void Builder::drop_loaded() {
+  const std::scoped_lock lock(mutex_);
+  if (!loaded_) return;
+  if (built_ && built_->volume == loaded_->volume) built_.reset();
+  loaded_.reset();
+}
+
 std::optional<Built> Builder::take_built() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(built_, std::nullopt);

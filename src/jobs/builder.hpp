@@ -66,6 +66,8 @@ class Builder : public JobSource {
 
   /// Returns the newest volume that was read, once.
   std::optional<LoadedVolume> take_loaded();
+  /// Drops the volume that was read, if it has not been taken, and its grid.
+  void drop_loaded();
   /// Returns the newest result, once.
   std::optional<Built> take_built();
   /// Returns the proxy of the running load, once.

@@ -261,7 +261,7 @@ void VolumeStage::set_volume(VolumeAssetPtr volume) {
   } else {
     jobs_.builder.cancel();
   }
-  jobs_.builder.take_loaded();  // drops a loaded volume that has not been shown
+  jobs_.builder.drop_loaded();
   drop_proxy();
   host_.sync();
   leave_feed();

@@ -271,6 +271,16 @@ TEST_F(Loading, RenderReportsFailuresLikeWait) {
   viewer_.reset();  // before its context
 }
 
+TEST_F(Loading, AFileThatWasReadButNotShownLeavesNothing) {
+  ASSERT_EQ(cumulet_load_volume(v_, clip_.paths().front().c_str(), nullptr), CUMULET_OK);
+  // Progress does not take results.
+  while (progress().stage != CUMULET_STAGE_IDLE) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_EQ(cumulet_set_volume(v_, nullptr), CUMULET_OK);
+  expect_none();  // a result that nobody takes would keep the viewer busy
+  ASSERT_EQ(cumulet_set_volume(v_, volume_.get()), CUMULET_OK);
+  expect_none();
+}
+
 TEST(ReportedFailures, CopiesAreReportedOnce) {
   using viewer::ContentFailures;
   using viewer::ContentKind;
