@@ -77,10 +77,6 @@ std::optional<Rectangle> Ui::find(const std::string& label) const {
 }
 
 void Ui::remember(const char* label, const char* tip) {
-  if (wanted_ == label) {
-    if (!ImGui::IsItemVisible()) ImGui::SetScrollHereY(0.5f);
-    wanted_.clear();
-  }
   const ImVec2 least = ImGui::GetItemRectMin();
   const ImVec2 most = ImGui::GetItemRectMax();
   const ImVec2 centre((least.x + most.x) * 0.5f, (least.y + most.y) * 0.5f);
@@ -88,6 +84,10 @@ void Ui::remember(const char* label, const char* tip) {
   Control& control = drawn_[label];
   control.rectangle = {least.x, least.y, most.x - least.x, most.y - least.y};
   control.in_view = ImGui::GetCurrentWindow()->ClipRect.Contains(centre);
+  if (wanted_ == label) {
+    if (!control.in_view) ImGui::SetScrollHereY(0.5f);
+    wanted_.clear();
+  }
   control.has_tip = tip != nullptr && tip[0] != '\0';
   if (!control.has_tip || !ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return;
   hovered_now_ = true;
