@@ -420,16 +420,25 @@ void Panel::statistics(const Model& model) {
 }
 
 void Panel::hint() const {
+  constexpr std::array lines{"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here,",
+                             "and an environment (.hdr, .exr) to light it,", "or press Ctrl+O.  F1 shows all keys."};
+  const float padding = 2.0f * ImGui::GetStyle().WindowPadding.x;
+  float width = 0.0f;
+  for (const char* line : lines) width = std::max(width, ImGui::CalcTextSize(line).x + padding);
+  width = std::min(width, static_cast<float>(view_.width) - ui_.px(24.0f));
   const ImVec2 middle(static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.y + 0.5 * view_.height));
   ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::SetNextWindowSize({width, 0.0f});
   ImGui::SetNextWindowBgAlpha(0.75f);
-  ImGui::Begin("hint", nullptr, overlay | ImGuiWindowFlags_NoInputs);
-  for (const char* line : {"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here,",
-                           "and an environment (.hdr, .exr) to light it,", "or press Ctrl+O.  F1 shows all keys."}) {
-    const float width = ImGui::CalcTextSize(line).x;
-    ImGui::SetCursorPosX(std::max(ImGui::GetCursorPosX(), (ImGui::GetWindowWidth() - width) * 0.5f));
+  ImGui::Begin("hint", nullptr, (overlay & ~ImGuiWindowFlags_AlwaysAutoResize) | ImGuiWindowFlags_NoInputs);
+  ImGui::PushTextWrapPos();
+  for (const char* line : lines) {
+    const float room = ImGui::GetContentRegionAvail().x;
+    const float length = ImGui::CalcTextSize(line, nullptr, false, room).x;
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(0.0f, 0.5f * (room - length)));
     ImGui::TextUnformatted(line);
   }
+  ImGui::PopTextWrapPos();
   ImGui::End();
 }
 
