@@ -98,6 +98,12 @@ def look(s, name):
     return picture, report, (x, y, width, height - 48)
 
 
+def assert_saved(screenshot, file, area):
+    """Compares the rendered image in a screenshot with a file of it."""
+    x, y, width, height = area
+    assert_alike(screenshot, file, area, (0, 0, width, height))
+
+
 def assert_alike(a, b, area, other=None):
     mean, most = difference(a, b, area, other)
     assert mean < ALIKE[0] and most < ALIKE[1], f"the pictures differ: mean {mean:.2f}, largest {most:.2f}"

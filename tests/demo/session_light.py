@@ -75,9 +75,9 @@ def test_lamps(s):
     """A light is added, made a spot light, dimmed and removed. Each is a step that can be undone and redone."""
     there = ["frames 3", "wait loaded", "frames 2"]
     # Hides handles and icons, because the images are compared.
-    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', *SETTLE, *shot("point"), 'click "Light"', "frames 2",
-                      'click "Light/Spot"', *there, 'report "spot.json"', 'drag "Power" 0.5 0.5 to "Power" 0.6 0.5', *SETTLE,
-                      *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
+    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', "move viewport 0.5 0.5", *SETTLE, *shot("point"), 'click "Light"', "frames 2",
+                      'click "Light/Spot"', *there, 'report "spot.json"', 'drag "Power" 0.5 0.5 to "Power" 0.6 0.5', "move viewport 0.5 0.5",
+                      *SETTLE, *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
                       'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), "key delete",
                       *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"',
                       # Typed values may be beyond the slider.

@@ -29,7 +29,7 @@ def test_unsaved(s):
             "close", "frames 2", "key enter", "frames 3", *shot("dialog"), "key escape", "frames 3", *shot("not_saved"),
             "key ctrl+s", *SAVE_AS, *shot("saved"),
             "key ]", "frames 3", f'drop "{s.out}/other.json"', "frames 2", *shot("opening"), "key escape", "frames 3", *shot("kept"),
-            f'drop "{s.out}/other.json"', "frames 2", 'click "Question/Discard"', *there, *shot("other"),
+            f'drop "{s.out}/other.json"', "frames 2", 'click "Question/Discard"', *there, *shot("opened"),
             "key ]", "frames 3", "key ctrl+n", "frames 2", 'click "Question/Discard"', *there, *shot("new"),
             'click "Add light"', "frames 3", *shot("untitled"), f'drop "{s.out}/other.json"', "frames 2", 'click "Question/Discard"', *there,
             "key ]", "frames 3", "key ctrl+q", "frames 2", 'click "Question/Save"', "frames 30", 'screenshot "never.png"'])
@@ -42,8 +42,9 @@ def test_unsaved(s):
     assert report("dialog")["dialog"] and report("not_saved")["modified"] and not report("not_saved")["dialog"]
     assert title("saved") == "scene.json - Cumulet" and (s.out / "scene.json").exists()
     assert report("opening")["question"] and title("opening") == title("kept") == "*scene.json - Cumulet"
-    assert title("other") == "other.json - Cumulet" and not report("other")["modified"]
-    assert title("new") == "Cumulet" and not report("new")["has_content"] and report("new")["volumes"] == []
+    assert title("opened") == "other.json - Cumulet" and not report("opened")["modified"]
+    assert title("new") == "Cumulet" and not report("new")["has_content"]
+    assert [volume["file"] for volume in report("new")["volumes"]] == [""], "its own volume is empty"
     assert title("untitled") == "*Untitled - Cumulet"
     assert not (s.out / "never.png").exists(), "a saved scene is closed"
     assert json.loads((s.out / "other.json").read_text())["display"]["exposure_stops"] > 0.3
