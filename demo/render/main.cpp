@@ -503,8 +503,9 @@ class Studio {
       progress_.stage("loading " + file);
       cumulet_surfaces* own = nullptr;
       if (file == scene.surfaces) check(viewer_, cumulet_get_surfaces(viewer_.get(), &own));
-      models_.give(file, own != nullptr ? cumulet::demo::SurfacesPtr(own, cumulet_surfaces_release)
-                                        : cumulet::demo::open_surfaces(file));
+      models_.give(file, own != nullptr
+                             ? cumulet::demo::SurfacesPtr(own, cumulet_surfaces_release)
+                             : cumulet::demo::open_surfaces(file, cumulet::demo::Messages::print, &messages_));
       check_not_interrupted();
     }
     models_.show(viewer_.get(), scene.models);
