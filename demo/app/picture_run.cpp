@@ -147,7 +147,7 @@ Answer PictureRun::turn() {
   return answer;
 }
 
-void PictureRun::report(double part) {
+void PictureRun::report(double part) const {
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "%.0f / %u samples", std::floor(part * desired_.scene.sampling.samples),
                 desired_.scene.sampling.samples);

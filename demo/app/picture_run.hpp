@@ -33,7 +33,7 @@ class PictureRun {
   void go_to(const Play& play, std::uint32_t index);
   // Lets the viewer work, and returns its state. Throws the cause if something cannot be loaded.
   [[nodiscard]] Answer turn();
-  void report(double part);
+  void report(double part) const;
 
   Session& session_;
   const PictureJob& job_;
