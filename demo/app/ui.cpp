@@ -210,7 +210,8 @@ bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& v
       !typing && ImGui::GetActiveID() == ImGui::GetID(id.c_str()) && pressed_ && pressed_->label == label;
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   const ImVec2 end(corner.x + ImGui::CalcItemWidth(), corner.y + ImGui::GetFrameHeight());
-  const bool over = ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect(corner, end);
+  const bool enabled = (ImGui::GetCurrentContext()->CurrentItemFlags & ImGuiItemFlags_Disabled) == 0;
+  const bool over = enabled && ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect(corner, end);
   const bool again = over && pressed_ && pressed_->label == label && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
   const Number before = again ? static_cast<Number>(pressed_->value) : value;
   Number edited = before;
