@@ -38,7 +38,10 @@ constexpr double picture_frame = 0.15;    // maximum seconds that the window wai
 
 }  // namespace
 
-App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(preferences_path()) {
+App::App(DemoOptions options)
+    : options_(std::move(options)),
+      preferences_path_(preferences_path()),
+      pictures_(options_.shader_cache, options_.shaders) {
   model_.scene = options_.scene;
   model_.scene_path = options_.scene_file;
   model_.unchosen_ground = options_.unchosen_ground;
@@ -69,7 +72,10 @@ App::App(DemoOptions options) : options_(std::move(options)), preferences_path_(
   // The scene's size is that of a rendered image. The window has its own size.
   model_.scene.width = 1280;
   model_.scene.height = 720;
-  if (!options_.open.empty()) open(options_.open);
+  if (!options_.open.empty())
+    open(options_.open);
+  else if (options_.scene_file.empty())
+    suggest_up_axis();
   history_.emplace(model_.scene);
   offer_recovery();
 }
@@ -123,6 +129,7 @@ void App::frame() {
   if (replay_.player) {
     ReplayHost host;
     host.loading = model_.status.busy || exchange_.waiting();
+    host.rendering = pictures_.queue().unfinished() > 0;
     host.converged = exchange_.settled() && (model_.status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
     host.viewport = image_->viewport();
     host.find = [this](const std::string& label) {
@@ -147,15 +154,18 @@ void App::frame() {
 
   model_.undo = history_->undo_name(model_.scene);
   model_.redo = history_->redo_name();
-  last_state_ = panel_.state();
+  frames_.state = panel_.state();
   take_thumbnail();
+  follow_renders();
+  model_.seconds_left = measurements_.seconds_left();
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
   execute(commands);
 
   if (std::exchange(camera_moved_, false) && model_.navigation.turntable_degrees_per_second == 0.0) last_motion_ = now_;
-  clock_.follow(exchange_.desired.scene.sequence);
-  held_ = ImGui::IsAnyItemActive() || image_->has_buttons() || now_ - last_motion_ < motion_rest;
+  clock_.follow(exchange_.desired.scene.sequence, loading_.reload || exchange_.waiting());
+  held_ = ImGui::IsAnyItemActive() || image_->has_buttons() || now_ - last_motion_ < motion_rest ||
+          panel_.ui().may_become_double_click();
   ask();
   if (stepped()) {
     renderer_->wait_for(exchange_.desired.number);
@@ -178,8 +188,8 @@ void App::frame() {
   ++frames_.count;
 
   const std::string name = scene_name(model_);
-  title_ = name.empty() ? "Cumulet" : name + " - Cumulet";
-  window_->set_title(title_);
+  frames_.title = name.empty() ? "Cumulet" : name + " - Cumulet";
+  window_->set_title(frames_.title);
 }
 
 void App::handle(const std::vector<Event>& events) {

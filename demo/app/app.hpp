@@ -15,6 +15,7 @@
 #include "measurements.hpp"
 #include "model.hpp"
 #include "panel.hpp"
+#include "picture_renderer.hpp"
 #include "preferences.hpp"
 #include "replay.hpp"
 #include "sequence_clock.hpp"
@@ -58,6 +59,17 @@ class App {
   void save_dialog(const char* title, Action action, const char* ending);
   void open(const std::string& path);
   void open_dropped(const std::vector<std::string>& files);
+  /// Says that a volume stands on its Z axis, with a button for the Y axis. further: the file of a further volume, ""
+  /// for the first one.
+  void show_up_axis(const std::string& path, const std::string& further);
+  /// Offers the Z axis for the first volume if its file's metadata says that Z is up.
+  void suggest_up_axis();
+  /// Renders the picture of the dialog in the background.
+  void render_picture();
+  /// Shows the progress and the results of the background pictures.
+  void follow_renders();
+  /// Returns true if pictures are rendered in the background. Asks the user about them.
+  bool ask_about_renders();
   /// Opens a scene. source: the file that is read, which may be a copy of the scene file.
   /// Returns false and reports the error if the file cannot be read.
   bool open_scene(const std::string& path, const std::string& source);
@@ -119,6 +131,8 @@ class App {
     double drawn_at = -1.0;
     bool pending = false;   // a change is not drawn yet
     bool in_popup = false;  // a menu or dialog was open before this frame, which a key may have closed since
+    std::string state;      // state line of the previous frame
+    std::string title;      // window title
   };
 
   DemoOptions options_;
@@ -131,6 +145,7 @@ class App {
   std::unique_ptr<ThumbnailTexture> thumbnail_texture_;
   Timeline timeline_;  // used with --trace
   std::unique_ptr<Renderer> renderer_;
+  PictureRenderer pictures_;
   std::optional<History> history_;
   std::optional<UnsavedChanges> changes_;
   Replay replay_;
@@ -149,8 +164,6 @@ class App {
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
   std::optional<cumulet_medium_desc> look_;  // default medium that was set for a volume
-  std::string last_state_;                   // state line of the previous frame
-  std::string title_;                        // window title
 };
 
 }  // namespace cumulet::demo

@@ -4,12 +4,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <info.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "app.hpp"
+#include "desktop.hpp"
 #include "dropped_files.hpp"
 #include "renderer.hpp"
 
@@ -54,8 +56,11 @@ struct App::Commands {
        [](App& app, const Command&) { app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb"}); }},
       {Action::add_volume,
        [](App& app, const Command& command) {
-         app.model_.scene.others.emplace_back().volume = command.text;
+         SceneVolume& added = app.model_.scene.others.emplace_back();
+         added.volume = command.text;
+         added.up = known_up_axis(command.text);
          spell_out_defaults(app.model_.scene);
+         if (added.up == UpAxis::z) app.show_up_axis(command.text, command.text);
        }},
       {Action::add_model_dialog,
        [](App& app, const Command&) { app.open_dialog("Add model", Action::add_model, {".gltf", ".glb"}); }},
@@ -85,6 +90,20 @@ struct App::Commands {
          app.changes_->recovery().take_over();
          app.changes_->recovery().remove();
        }},
+      {Action::render_dialog,
+       [](App& app, const Command&) {
+         if (app.model_.status.has_content) app.panel_.render_dialog().open(app.model_);
+       }},
+      {Action::render, [](App& app, const Command&) { app.render_picture(); }},
+      {Action::cancel_render,
+       [](App& app, const Command& command) { app.pictures_.queue().cancel(std::stoull(command.text)); }},
+      {Action::toggle_renders, [](App& app, const Command&) { app.model_.renders_open = !app.model_.renders_open; }},
+      {Action::clear_renders, [](App& app, const Command&) { app.pictures_.queue().clear(); }},
+      {Action::show_in_folder,
+       [](App& app, const Command& command) {
+         if (!show_in_folder(command.text))
+           show_message(app.model_, true, command.text + ": xdg-open is not installed", app.now_);
+       }},
       {Action::png_dialog,
        [](App& app, const Command&) {
          if (app.model_.status.has_content) app.save_dialog("Save image", Action::save_png, ".png");
@@ -106,6 +125,8 @@ struct App::Commands {
        [](App& app, const Command& command) {
          std::erase_if(app.model_.messages, [&](const Message& message) { return message.text == command.text; });
        }},
+      {Action::toggle_log, [](App& app, const Command&) { app.model_.log_open = !app.model_.log_open; }},
+      {Action::clear_log, [](App& app, const Command&) { app.model_.log.clear(); }},
       {Action::toggle_panel, [](App& app, const Command&) { app.model_.panel = !app.model_.panel; }},
       {Action::focus_panel,
        [](App& app, const Command&) {
@@ -174,6 +195,11 @@ struct App::Commands {
        [](App& app, const Command& command) {
          // The volume moves with the up axis, so the camera must be fitted again.
          const auto up = static_cast<UpAxis>(command.value);
+         if (!command.text.empty()) {
+           for (SceneVolume& other : app.model_.scene.others)
+             if (other.volume == command.text) other.up = up;
+           return;
+         }
          app.loading_.fit = app.model_.scene.up != up;
          app.model_.scene.up = up;
          if (app.model_.status.play) app.model_.scene.sequence.frame = app.model_.status.play->frame();
@@ -199,6 +225,10 @@ struct App::Commands {
       {Action::clear_region,
        [](App& app, const Command&) { std::ranges::fill(app.model_.scene.sampling.region, 0.0f); }},
       {Action::quit,
+       [](App& app, const Command&) {
+         if (!app.ask_about_renders()) app.execute({Action::quit_anyway});
+       }},
+      {Action::quit_anyway,
        [](App& app, const Command& command) {
          if (!app.ask_about_changes({command})) app.quit_ = true;
        }},
@@ -208,7 +238,7 @@ struct App::Commands {
   static constexpr bool is_complete() {
     for (std::size_t i = 0; i < table.size(); ++i)
       if (table[i].action != static_cast<Action>(i)) return false;
-    return table.size() == static_cast<std::size_t>(Action::quit) + 1;
+    return table.size() == static_cast<std::size_t>(Action::quit_anyway) + 1;
   }
 };
 
@@ -259,8 +289,7 @@ void App::open(const std::string& path) {
   } else {
     const UpAxis up = known_up_axis(path);
     set_volume(model_.scene, {.volume = path, .up = up});
-    if (up == UpAxis::z)
-      show_message(model_, false, path + ": Z is up, as its metadata says. Edit, Up axis Y changes that", now_);
+    if (up == UpAxis::z) show_up_axis(path, "");
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();
     model_.scene.sequence.frame.reset();
@@ -272,8 +301,63 @@ void App::open(const std::string& path) {
   if (!keeps && file_count(model_.scene) == 1) changes_->reset();
 }
 
+void App::show_up_axis(const std::string& path, const std::string& further) {
+  show_message(model_, false, path + ": Z is up, as its metadata says", now_,
+               MessageButton{"Y up",
+                             "Stands the volume on its Y axis, as in its file. Ctrl+Z undoes that.",
+                             {Action::choose_up, further, static_cast<int>(UpAxis::y)}});
+}
+
+void App::suggest_up_axis() {
+  const SceneVolume& volume = model_.scene;
+  if (!volume.is_shown() || volume.up != UpAxis::y || known_up_axis(volume.volume) != UpAxis::z) return;
+  show_message(model_, false, volume.volume + ": written by Blender or Mantaflow, whose up axis is Z", now_,
+               MessageButton{"Z up",
+                             "Stands the volume on its Z axis, as --up z. Ctrl+Z undoes that.",
+                             {Action::choose_up, "", static_cast<int>(UpAxis::z)}});
+}
+
+void App::render_picture() {
+  SceneOptions scene = model_.scene;
+  if (const auto& play = model_.status.play) {
+    scene.sequence.frame = play->frame();
+    scene.surface.time = std::max(model_.clock, 0.0);
+  }
+  try {
+    pictures_.add(job_of(panel_.render_dialog().settings(), scene));
+    model_.renders_open = true;
+  } catch (const std::exception& error) {
+    show_message(model_, true, error.what(), now_);
+  }
+}
+
+void App::follow_renders() {
+  RenderQueue& queue = pictures_.queue();
+  model_.renders = queue.entries();
+  for (const RenderEntry& entry : queue.take_ended()) {
+    const MessageButton button{"Show in folder", "Opens the folder of the file.", {Action::show_in_folder, entry.path}};
+    if (entry.state == RenderEntry::State::failed)
+      show_message(model_, true, "Render of " + entry.path + " failed: " + entry.text, now_);
+    else if (entry.state == RenderEntry::State::done)
+      show_message(model_, false, "Rendered " + entry.path + ", " + entry.text, now_, button);
+  }
+}
+
+bool App::ask_about_renders() {
+  const std::size_t count = pictures_.queue().unfinished();
+  if (count == 0) return false;
+  panel_.question().ask(
+      "Unfinished pictures",
+      (count == 1 ? "A picture is" : std::to_string(count) + " pictures are") + std::string(" still being rendered."),
+      {{"Wait", "Returns to the scene.", std::nullopt},
+       {"Quit anyway", "Cancels the pictures.", Command{Action::quit_anyway}},
+       {"Cancel", "Returns to the scene (Escape).", std::nullopt}});
+  return true;
+}
+
 void App::open_dropped(const std::vector<std::string>& files) {
   const DroppedFiles dropped = demo::open_dropped(files);
+  clock_.play_when_loaded(dropped.plays);
   const bool replaces = !dropped.commands.empty() && has_ending(dropped.commands.front().text, ".json");
   if (!replaces || !ask_about_changes(dropped.commands)) execute(dropped.commands);
   for (const std::string& file : dropped.left_out)

@@ -33,8 +33,11 @@ DroppedFiles open_dropped(const std::vector<std::string>& files) {
                                                                : volumes;
     kind.push_back(file);
   }
-  if (const auto sequence = common_sequence(volumes)) volumes = {*sequence};
   DroppedFiles dropped;
+  if (const auto sequence = common_sequence(volumes)) {
+    volumes = {*sequence};
+    dropped.plays = scenes.empty();
+  }
   // A scene replaces everything, so it comes first.
   for (std::vector<std::string>* const kind : {&scenes, &environments}) {
     if (kind->empty()) continue;

@@ -11,6 +11,7 @@ namespace cumulet::demo {
 struct DroppedFiles {
   std::vector<Command> commands;
   std::vector<std::string> left_out;  // files that another one replaces
+  bool plays = false;                 // a sequence is opened, which then plays
 };
 
 /// The first file of each kind is opened, and further volumes and models are added. Numbered files of one sequence are

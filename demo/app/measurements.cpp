@@ -3,6 +3,7 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <cmath>
 #include <utility>
 
 namespace cumulet::demo {
@@ -34,6 +35,11 @@ void Measurements::take_status(const Status& status, std::uint64_t drawn, double
 
   constexpr double rate_period = 0.5;
   const bool more = (status.frame.flags & CUMULET_RENDER_INCOMPLETE) != 0;
+  const bool preview = (status.frame.flags & CUMULET_RENDER_PREVIEW) != 0;
+  if (more && !preview && status.frame.progress > 0.0)
+    time_left_.see(status.frame.progress, now);
+  else
+    time_left_.rest();
   const double elapsed = now - rate_since_;
   // A decreasing count means that the image was restarted.
   if (status.stats.samples < rate_samples_ || !more) {
@@ -45,6 +51,11 @@ void Measurements::take_status(const Status& status, std::uint64_t drawn, double
     rate_samples_ = status.stats.samples;
     rate_since_ = now;
   }
+}
+
+std::optional<double> Measurements::seconds_left() const {
+  const auto seconds = time_left_.seconds();
+  return seconds ? std::optional(std::ceil(*seconds)) : std::nullopt;
 }
 
 }  // namespace cumulet::demo

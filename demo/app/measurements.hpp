@@ -6,6 +6,7 @@
 
 #include "input.hpp"
 #include "model.hpp"
+#include "time_left.hpp"
 
 namespace cumulet::demo {
 
@@ -23,6 +24,8 @@ class Measurements {
   void take_frame(const std::vector<Event>& events, bool drawn, bool picture, bool due, bool pending);
   /// Records the viewer's statistics. drawn: the latest request with a drawn image.
   void take_status(const Status& status, std::uint64_t drawn, double now);
+  /// Returns the seconds until the image has all samples, rounded up to whole seconds; nullopt if that is unknown.
+  [[nodiscard]] std::optional<double> seconds_left() const;
 
  private:
   Charts& charts_;
@@ -32,6 +35,7 @@ class Measurements {
   double device_seconds_ = 0.0;  // last value of the statistics
   double rate_since_ = 0.0;
   std::uint64_t rate_samples_ = 0;
+  TimeLeft time_left_;
 };
 
 }  // namespace cumulet::demo

@@ -137,6 +137,11 @@ Menu view_menu() {
            scale_entry<150>("Scale 150 %"),
            scale_entry<200>("Scale 200 %"),
            {"Keyboard to panel", {Action::focus_panel}, "Moves the keyboard focus to the panel."},
+           {"Messages",
+            {Action::toggle_log},
+            "Shows the log of all messages.",
+            nullptr,
+            [](const Model& model) { return model.log_open; }},
            {"Dismiss message", {Action::dismiss}, "Hides the newest message.", [](const Model& model) {
               return !model.messages.empty();
             }}}};
@@ -144,7 +149,14 @@ Menu view_menu() {
 
 Menu render_menu() {
   return {"Render",
-          {{"Save PNG...", {Action::png_dialog}, "Saves the displayed image at full resolution.", has_content},
+          {{"Render...", {Action::render_dialog}, "Renders a picture or a sequence in the background.", has_content},
+           {"Render queue",
+            {Action::toggle_renders},
+            "Shows the pictures that are rendered in the background.",
+            nullptr,
+            [](const Model& model) { return model.renders_open; }},
+           separator,
+           {"Save PNG...", {Action::png_dialog}, "Saves the displayed image at full resolution.", has_content},
            {"Save EXR...", {Action::exr_dialog}, "Saves the linear radiance and AOVs as OpenEXR.", has_content},
            separator,
            {"Brighter", {Action::brighter}, "Exposure up by a third of a stop."},
@@ -246,7 +258,8 @@ void draw_menu_bar(Ui& ui, const Model& model, std::vector<Command>& commands) {
     }
     ImGui::EndMenu();
   }
-  const std::string name = scene_name(model);
+  const float room = ImGui::GetWindowWidth() - ImGui::GetCursorPosX() - ui.px(14.0f);
+  const std::string name = room > ui.px(60.0f) ? end_of(scene_name(model), room) : "";
   const float width = ImGui::CalcTextSize(name.c_str()).x + ui.px(14.0f);
   ImGui::SetCursorPosX(std::max(ImGui::GetWindowWidth() - width, ImGui::GetCursorPosX()));
   Ui::heading(name.c_str());

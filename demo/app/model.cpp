@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <numbers>
 #include <program.hpp>
@@ -38,8 +39,9 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
       {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
-      {GLFW_KEY_F12, 0, {Action::png_dialog}, "F12", "Save the image as PNG"},
-      {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the image as linear OpenEXR"},
+      {GLFW_KEY_F12, 0, {Action::render_dialog}, "F12", "Render a picture or a sequence in the background"},
+      {GLFW_KEY_F12, ctrl, {Action::png_dialog}, "Ctrl+F12", "Save the displayed image as PNG"},
+      {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the displayed image as linear OpenEXR"},
       {GLFW_KEY_Z, ctrl, {Action::undo}, "Ctrl+Z", "Undo"},
       {GLFW_KEY_Z, ctrl | shift, {Action::redo}, "Ctrl+Shift+Z, Ctrl+Y", "Redo"},
       {GLFW_KEY_Y, ctrl, {Action::redo}, "", ""},
@@ -259,17 +261,34 @@ void give_daylight(SceneOptions& scene) {
   if (settings::same(scene.light, spelled_out({}))) scene.light = daylight();
 }
 
-void show_message(Model& model, bool error, const std::string& text, double now) {
+namespace {
+
+std::string clock_text() {
+  std::array<char, 16> text{};
+  std::tm local{};
+  const std::time_t now = std::time(nullptr);
+  if (::localtime_r(&now, &local) == nullptr) return "";
+  return {text.data(), std::strftime(text.data(), text.size(), "%H:%M:%S", &local)};
+}
+
+}  // namespace
+
+void show_message(Model& model, bool error, const std::string& text, double now, std::optional<MessageButton> button) {
   constexpr double seconds = 5.0;
+  constexpr double button_seconds = 60.0;
   constexpr std::size_t most = 3;
+  constexpr std::size_t max_logged = 500;
   const std::string line = one_line(text);
+  if (model.log.size() == max_logged) model.log.erase(model.log.begin());
+  model.log.push_back({error, clock_text(), line});
   std::erase_if(model.messages, [&](const Message& message) { return message.text == line; });
   if (model.messages.size() >= most) {
     // Notices are removed before errors.
     const auto notice = std::ranges::find(model.messages, false, &Message::error);
     model.messages.erase(notice != model.messages.end() ? notice : model.messages.begin());
   }
-  model.messages.push_back({error, line, now + seconds});
+  const double until = now + (button ? button_seconds : seconds);
+  model.messages.push_back({error, line, until, std::move(button)});
 }
 
 void spell_out_defaults(SceneOptions& scene) {

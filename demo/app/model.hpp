@@ -15,6 +15,7 @@
 #include "environment_view.hpp"
 #include "gizmo.hpp"
 #include "preferences.hpp"
+#include "render_entry.hpp"
 #include "replay.hpp"
 #include "scene_items.hpp"
 
@@ -40,6 +41,12 @@ enum class Action {
   discard_changes,  // then carries out the commands that wait for the user's answer
   recover,          // opens the scene that an ended process has left
   discard_recovery,
+  render_dialog,
+  render,         // renders the picture of the dialog in the background
+  cancel_render,  // text: the number of an entry of the render queue
+  toggle_renders,
+  clear_renders,   // removes the ended entries from the list
+  show_in_folder,  // text: the file
   png_dialog,
   save_png,  // text: the file
   exr_dialog,
@@ -49,7 +56,9 @@ enum class Action {
   frame_all,
   cancel,  // Escape: closes the help, dismisses a message or cancels a load
   cancel_load,
-  dismiss,
+  dismiss,  // text: that of the message
+  toggle_log,
+  clear_log,
   toggle_panel,
   focus_panel,
   duplicate_selected,
@@ -67,7 +76,7 @@ enum class Action {
   view,  // value: a cumulet_view_mode
   grids_dialog,
   choose_grid,   // text: the grid's name
-  choose_up,     // value: an UpAxis
+  choose_up,     // value: an UpAxis; text: the file of a further volume, "" for the first one
   auto_density,  // sets the suggested density scale
   play_row,      // plays the sequence that the volume's file belongs to
   play,          // play or pause
@@ -77,7 +86,8 @@ enum class Action {
   end_here,
   draw_region,   // the next drag over the image sets the render region
   clear_region,  // removes the render region
-  quit
+  quit,          // asks about unsaved changes and unfinished pictures
+  quit_anyway    // asks only about unsaved changes
 };
 
 struct Command {
@@ -111,10 +121,25 @@ struct GridInfo {
 [[nodiscard]] inline const VolumeFile& volume_of(const SceneVolume& scene) { return scene; }
 inline void set_volume(SceneOptions& scene, const VolumeFile& volume) { static_cast<VolumeFile&>(scene) = volume; }
 
+/// A button of a message, which executes a command and removes the message.
+struct MessageButton {
+  const char* label;
+  const char* tip;
+  Command command;
+};
+
 struct Message {
   bool error = false;
   std::string text;
   double until = 0.0;  // in seconds; errors stay until they are dismissed
+  std::optional<MessageButton> button = {};
+};
+
+/// A message in the log.
+struct LoggedMessage {
+  bool error = false;
+  std::string time;  // local time: "14:05:12"
+  std::string text;
 };
 
 /// A series of values over time, oldest first.
@@ -225,7 +250,12 @@ struct Model {
   Status status;
   unsigned thumbnail_texture = 0;  // OpenGL name of status.thumbnail in the window's context; 0: none
   Charts charts;
+  std::optional<double> seconds_left;  // until the image has all samples; nullopt if that is unknown
   std::vector<Message> messages;
+  std::vector<LoggedMessage> log;  // all messages, oldest first
+  bool log_open = false;
+  std::vector<RenderEntry> renders;  // pictures of the render queue, oldest first
+  bool renders_open = false;
   Preferences preferences;
 
   Model();
@@ -252,8 +282,10 @@ void open_surfaces(Model& model, const std::string& path);
 void take_daylight(SceneOptions& scene);
 void give_daylight(SceneOptions& scene);
 
-/// Adds a line to the message bar and replaces an equal one. Errors stay; notices disappear after a while.
-void show_message(Model& model, bool error, const std::string& text, double now);
+/// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear
+/// after a while, those with a button later.
+void show_message(Model& model, bool error, const std::string& text, double now,
+                  std::optional<MessageButton> button = std::nullopt);
 
 /// Replaces zeros that mean a default by the default value (cumulet.h), so that controls can show it.
 void spell_out_defaults(SceneOptions& scene);

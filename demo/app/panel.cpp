@@ -16,6 +16,8 @@
 
 #include "history.hpp"
 #include "menus.hpp"
+#include "renders_panel.hpp"
+#include "status_line.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -59,11 +61,15 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   if (model.status.busy && (works || !model.status.loading.empty())) loading(model, commands);
   state_.clear();
   if (model.status.has_content) state_line(model);
+  if (model.log_open) log(model, commands);
+  draw_renders(ui_, view_, model, commands);
   messages(model, commands);
+  for (const std::string& refusal : ui_.take_refusals()) show_message(model, false, refusal, time_);
   if (model.help) help(model);
   help_was_closed_ = !model.help;
   dialog_.draw(ui_, model.preferences, commands);
   picker_.draw(ui_, commands);
+  render_dialog_.draw(ui_, model, commands);
   question_.draw(ui_, commands);
 }
 
@@ -394,8 +400,9 @@ void Panel::statistics(const Model& model) {
            print("%.0f ms", static_cast<double>(charts.picture_ms.latest())));
   ui_.plot("Samples per second", "Completed camera paths per second.", charts.samples_per_second.values(),
            short_count(static_cast<double>(charts.samples_per_second.latest())) + "/s");
+  const auto noise = shown_noise(status);
   ui_.plot("Noise", "Relative standard error of the samples, before denoising, measured once per second.",
-           charts.noise_percent.values(), status.noise ? print("%.2f %%", 100.0 * *status.noise) : std::string("-"));
+           charts.noise_percent.values(), noise ? print("%.2f %%", 100.0 * *noise) : std::string("-"));
   ui_.plot("GPU time", "GPU milliseconds of the library's passes per frame.", charts.device_ms.values(),
            print("%.1f ms", static_cast<double>(charts.device_ms.latest())));
   if (const double all = device_seconds(stats); all > 0.0) {
@@ -467,79 +474,25 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
   ImGui::End();
 }
 
-void Panel::messages(Model& model, std::vector<Command>& commands) {
-  std::erase_if(model.messages, [this](const Message& message) { return !message.error && message.until < time_; });
-  if (model.messages.empty()) return;
-  const float width = static_cast<float>(view_.width) - ui_.px(24.0f);
-  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(44.0f)}, ImGuiCond_Always,
-                          {0.0f, 1.0f});
-  ImGui::SetNextWindowSize({width, 0.0f});
-  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(10.0f), ui_.px(7.0f)});
-  ImGui::Begin("messages", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
-  const float button = ui_.px(76.0f);
-  for (std::size_t i = 0; i < model.messages.size(); ++i) {
-    const Message& message = model.messages[i];
-    ImGui::PushID(static_cast<int>(i));
-    const ImVec2 corner = ImGui::GetCursorScreenPos();
-    const ImU32 mark = message.error ? IM_COL32(230, 105, 85, 255) : IM_COL32(127, 180, 230, 255);
-    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ui_.px(12.0f));
-    ImGui::AlignTextToFramePadding();
-    // Errors are wrapped, not truncated.
-    ImGui::PushTextWrapPos(ImGui::GetWindowWidth() - button - ui_.px(18.0f));
-    ImGui::TextUnformatted(message.text.c_str());
-    ImGui::PopTextWrapPos();
-    ImGui::GetWindowDrawList()->AddRectFilled({corner.x, ImGui::GetItemRectMin().y},
-                                              {corner.x + ui_.px(4.0f), ImGui::GetItemRectMax().y}, mark, ui_.px(2.0f));
-    ui_.remember("Message", message.text.c_str());
-    ImGui::SameLine();
-    ImGui::SetCursorPosX(ImGui::GetWindowWidth() - button - ui_.px(10.0f));
-    if (ui_.button("Dismiss", "Hides the message (Escape).", {button, 0.0f}))
-      commands.push_back({Action::dismiss, message.text});
-    ImGui::PopID();
-  }
-  ImGui::End();
-  ImGui::PopStyleVar();
-}
-
 void Panel::state_line(const Model& model) {
-  const Status& status = model.status;
-  const double part = std::clamp(status.frame.progress, 0.0, 1.0);
-  std::string text =
-      print("%.0f of %u samples", std::floor(part * model.scene.sampling.samples), model.scene.sampling.samples);
-  const bool converged = (status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
-  if (converged) text = print("%u samples", model.scene.sampling.samples);
-  if (model.scene.sampling.noise_target_percent > 0.0f && status.frame.width > 0) {
-    // With a noise target, the number of samples is only a maximum.
-    const double all = double(status.frame.width) * status.frame.height;
-    text = print("%.0f samples", std::floor(static_cast<double>(status.stats.samples) / all));
-    if (!converged) text += print(" (%.0f %%)", std::floor(100.0 * part));
-  }
-  const cumulet_view_mode shown = model.scene.sampling.view;
-  for (const auto& view : settings::view_choices)
-    if (view.value == shown && shown != CUMULET_VIEW_SHADED) text = view.name;
-  // During a preview the image has no samples of its size.
-  if ((status.frame.flags & CUMULET_RENDER_PREVIEW) != 0) text = "Preview";
-  text += print("   %ux%u", status.frame.width, status.frame.height);
-  // The noise is that of the samples, which the denoised image does not show. Few samples do not tell it.
-  constexpr double min_noise_samples = 4.0;
-  const double pixels = double(status.frame.width) * status.frame.height;
-  const bool is_shaded = shown == CUMULET_VIEW_SHADED;
-  if (is_shaded && model.scene.display.denoise != CUMULET_DENOISE_OFF)
-    text += "   denoised";
-  else if (status.noise && static_cast<double>(status.stats.samples) >= min_noise_samples * pixels)
-    text += print("   noise %.2f %%", 100.0 * *status.noise);
-  if (model.navigation.fly != 0) text += "   flying";
-  if (!status.saving.empty()) text += "   saving " + file_name(status.saving) + " when all pixels are sampled";
-  state_ = text;
+  state_ = status_text(model);
   ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
                           {0.0f, 1.0f});
   ImGui::SetNextWindowBgAlpha(0.55f);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(9.0f), ui_.px(4.0f)});
   ImGui::Begin("state", nullptr, overlay | ImGuiWindowFlags_NoInputs);
-  ImGui::TextUnformatted(text.c_str());
+  // A narrow image shows the beginning of the line.
+  std::string shown = state_;
+  const float room = static_cast<float>(view_.width) - ui_.px(42.0f);
+  for (std::size_t cut = 0; ImGui::CalcTextSize(shown.c_str()).x > room; shown.resize(cut)) {
+    cut = shown.rfind("   ");
+    if (cut == std::string::npos) break;
+  }
+  ImGui::TextUnformatted(shown.c_str());
   ImGui::End();
   ImGui::PopStyleVar();
   // Rounded to whole pixels, because a smaller change would redraw the window without effect.
+  const double part = std::clamp(model.status.frame.progress, 0.0, 1.0);
   ImGui::GetForegroundDrawList()->AddRectFilled(
       {0.0f, static_cast<float>(view_.y + view_.height) - ui_.px(2.0f)},
       {static_cast<float>(std::floor(view_.width * part)), static_cast<float>(view_.y + view_.height)},
@@ -585,7 +538,7 @@ void Panel::help(Model& model) {
   }
   row("Wheel", "Dolly");
   row("Click", "Select an object;  drag its handles, Ctrl: snap");
-  row("Ctrl+click", "Type a number into a slider");
+  row("Double click", "Type a number into a slider;  Shift+drag: fine,  right click: default");
   ImGui::End();
 }
 

@@ -11,6 +11,7 @@
 #include "outliner.hpp"
 #include "question.hpp"
 #include "ramp_edit.hpp"
+#include "render_dialog.hpp"
 #include "rows.hpp"
 #include "ui.hpp"
 
@@ -28,8 +29,11 @@ class Panel {
   void focus() { focus_ = true; }
   [[nodiscard]] FileDialog& dialog() { return dialog_; }
   /// Returns true if a modal dialog is open.
-  [[nodiscard]] bool dialog_open() const { return dialog_.is_open() || picker_.is_open() || question_.is_open(); }
+  [[nodiscard]] bool dialog_open() const {
+    return dialog_.is_open() || picker_.is_open() || question_.is_open() || render_dialog_.is_open();
+  }
   [[nodiscard]] GridPicker& picker() { return picker_; }
+  [[nodiscard]] RenderDialog& render_dialog() { return render_dialog_; }
   [[nodiscard]] Question& question() { return question_; }
   [[nodiscard]] const Question& question() const { return question_; }
   [[nodiscard]] Ui& ui() { return ui_; }
@@ -77,7 +81,11 @@ class Panel {
 
   void hint() const;
   void loading(const Model& model, std::vector<Command>& commands);
+  /// Draws the messages as toasts at the lower right of the image.
   void messages(Model& model, std::vector<Command>& commands);
+  void toast(const Message& message, std::vector<Command>& commands);
+  /// Draws the log of all messages.
+  void log(Model& model, std::vector<Command>& commands);
   void state_line(const Model& model);
   void help(Model& model);
 
@@ -87,6 +95,7 @@ class Panel {
   std::array<RampView, settings::ramps.size()> ramp_views_;
   FileDialog dialog_;
   GridPicker picker_;
+  RenderDialog render_dialog_;
   Question question_;
   bool focus_ = false;
   bool help_was_closed_ = true;

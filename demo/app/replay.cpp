@@ -111,8 +111,9 @@ class Parser {
     const std::string command = line.word();
     if (command == "wait") {
       const std::string what = line.word();
-      if (what != "loaded" && what != "converged") line.fail("wait needs loaded or converged");
-      add(what == "loaded" ? Type::wait_loaded : Type::wait_converged);
+      if (what != "loaded" && what != "converged" && what != "rendered")
+        line.fail("wait needs loaded, converged or rendered");
+      add(what == "loaded" ? Type::wait_loaded : what == "converged" ? Type::wait_converged : Type::wait_rendered);
     } else if (command == "frames") {
       add(Type::frames).count = line.integer(1, max_frames);
     } else if (command == "idle") {
@@ -297,9 +298,13 @@ bool Player::wait_over(const ReplayHost& host) {
   // The state shows a requested change only after a frame or two.
   constexpr int settle = 3;
   const bool loaded = step.type == ReplayStep::Type::wait_loaded;
-  if (frames_ > settle && !host.loading && (loaded || host.converged)) return true;
+  const bool rendered = step.type == ReplayStep::Type::wait_rendered;
+  const bool done = rendered ? !host.rendering : !host.loading && (loaded || host.converged);
+  if (frames_ > settle && done) return true;
   if (Clock::now() - since_ > patience)
-    fail(loaded ? "loading did not finish in time" : "the image did not converge in time");
+    fail(rendered ? "the pictures were not rendered in time"
+         : loaded ? "loading did not finish in time"
+                  : "the image did not converge in time");
   return false;
 }
 
@@ -315,6 +320,7 @@ Player::Order Player::next(const ReplayHost& host, Input& input) {
   switch (step.type) {
     case ReplayStep::Type::wait_loaded:
     case ReplayStep::Type::wait_converged:
+    case ReplayStep::Type::wait_rendered:
     case ReplayStep::Type::frames:
       if (!wait_over(host)) return order;
       break;

@@ -31,7 +31,19 @@ struct Position {
 };
 
 struct ReplayStep {
-  enum class Type { wait_loaded, wait_converged, frames, idle, move, event, text, screenshot, report, quit };
+  enum class Type {
+    wait_loaded,
+    wait_converged,
+    wait_rendered,
+    frames,
+    idle,
+    move,
+    event,
+    text,
+    screenshot,
+    report,
+    quit
+  };
   int line = 0;
   Type type = Type::frames;
   int count = 1;         // for frames
@@ -50,6 +62,7 @@ struct ReplayStep {
 struct ReplayHost {
   bool loading = false;
   bool converged = false;
+  bool rendering = false;  // pictures are rendered in the background
   Rectangle viewport;
   /// Returns the rectangle of a control. If it is not in view, scrolls to it for the next frame.
   std::function<std::optional<Rectangle>(const std::string& label)> find;

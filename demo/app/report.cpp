@@ -50,7 +50,7 @@ void App::write_report(const std::string& path) const {
   json["busy"] = status.busy;
   json["has_volume"] = status.has_volume;
   json["has_content"] = status.has_content;
-  json["title"] = title_;
+  json["title"] = frames_.title;
   json["saving"] = status.saving;
   json["cells"] = status.stats.cells;
   json["cell_bytes"] = status.stats.cell_bytes;
@@ -85,14 +85,22 @@ void App::write_report(const std::string& path) const {
     json["sequence"]["repeat"] = static_cast<int>(given.playback.repeat);
   }
   json["neighbours"] = status.neighbours ? status.neighbours->count() : 0;
-  json["state"] = last_state_;
+  json["state"] = frames_.state;
   json["modified"] = model_.modified;
   json["question"] = panel_.question().is_open() ? Json(panel_.question().title()) : Json();
   json["dialog"] = panel_.dialog_open();
   json["recent"] = model_.preferences.recent;
   json["messages"] = Json::array();
   for (const Message& message : model_.messages)
-    json["messages"].push_back({{"error", message.error}, {"text", message.text}});
+    json["messages"].push_back({{"error", message.error},
+                                {"text", message.text},
+                                {"button", message.button ? Json(message.button->label) : Json()}});
+  json["log"] = Json::array();
+  for (const LoggedMessage& message : model_.log) json["log"].push_back(message.text);
+  json["renders"] = Json::array();
+  for (const RenderEntry& entry : model_.renders)
+    json["renders"].push_back(
+        {{"file", entry.path}, {"state", static_cast<int>(entry.state)}, {"part", entry.part}, {"text", entry.text}});
   json["tool"] = static_cast<int>(model_.tool);
   json["local_axes"] = model_.axes == Axes::local;
   json["chosen"] = model_.chosen ? Json(title_of(model_.scene, *model_.chosen)) : Json();

@@ -73,7 +73,7 @@ bool Rows::draw(const settings::SettingInfo& info, float (&value)[3]) {
   float hue[3] = {kept[0], kept[1], kept[2]};
   bool changed = ui_.color(row.color, row.color_tip, hue);
   changed |= ui_.slider(row.label, row.tip, strength, static_cast<float>(row.least), static_cast<float>(row.most),
-                        row.format, ImGuiSliderFlags_Logarithmic);
+                        row.format, ImGuiSliderFlags_Logarithmic, info.given.value_or(info.range));
   if (!changed) return false;
   for (std::size_t i = 0; i < 3; ++i) {
     kept[i] = hue[i];

@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <aov_table.hpp>
+#include <exception>
 #include <image.hpp>
+#include <object_name.hpp>
 #include <stdexcept>
 #include <straight_alpha.hpp>
+#include <utility>
 #include <vector>
 
 #include "aovs.hpp"
+#include "denoised.hpp"
 #include "metadata.hpp"
 
 namespace cumulet::demo {
@@ -73,6 +77,59 @@ void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_f
   }
   write_exr(viewer, path, windows_of(scene.sampling.region, shown.width, shown.height), {rgba}, aovs,
             metadata_of(viewer, scene, shown.width, shown.height));
+}
+
+namespace {
+
+/// Returns the denoised picture. Returns an empty vector and sets the note if there is none: a noisy picture is better
+/// than none.
+std::vector<float> denoise(cumulet_viewer* viewer, const cumulet_frame_result& shown, Denoise how, std::string& note) {
+  if (how == Denoise::off) return {};
+  std::string network;
+  try {
+    if (how == Denoise::high) network = find_network("");
+  } catch (const std::exception& error) {
+    note = std::string("denoised by the fast filter: ") + error.what();
+  }
+  try {
+    return denoised(viewer, network, std::size_t{4} * shown.width * shown.height);
+  } catch (const std::exception& error) {
+    note = std::string("not denoised: ") + error.what();
+    return {};
+  }
+}
+
+void write_bytes(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
+                 const PictureFile& file, const std::vector<float>& denoised) {
+  std::vector<std::uint8_t> bytes(std::size_t{4} * shown.width * shown.height);
+  check(viewer, denoised.empty() ? cumulet_read_display(viewer, bytes.data(), bytes.size())
+                                 : cumulet_encode_display(viewer, denoised.data(), bytes.data(), bytes.size()));
+  clear_around(windows_of(scene.sampling.region, shown.width, shown.height), bytes);
+  if (file.format == PictureFormat::webp)
+    image::write_webp(file.path, shown.width, shown.height, bytes);
+  else
+    image::write_png(file.path, shown.width, shown.height, bytes);
+}
+
+}  // namespace
+
+std::string write_picture_file(cumulet_viewer* viewer, const SceneOptions& scene, const Instances& others,
+                               const cumulet_frame_result& shown, const PictureFile& file) {
+  require_picture(shown);
+  std::string note;
+  const std::vector<float> smooth = denoise(viewer, shown, file.denoise, note);
+  if (file.format != PictureFormat::exr) {
+    write_bytes(viewer, scene, shown, file, smooth);
+    return note;
+  }
+  const std::vector<float> rgba = read_linear(viewer, shown);
+  ObjectName name;
+  if (file.cryptomatte)
+    name = [&](cumulet_object_kind kind, std::uint64_t tag) { return object_name(scene, others, kind, tag); };
+  write_exr(viewer, file.path, windows_of(scene.sampling.region, shown.width, shown.height),
+            {rgba, smooth, scene.light_groups, std::move(name)}, file.aovs,
+            metadata_of(viewer, scene, shown.width, shown.height));
+  return note;
 }
 
 }  // namespace cumulet::demo

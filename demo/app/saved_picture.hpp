@@ -3,8 +3,11 @@
 #include <cumulet/cumulet.h>
 
 #include <cstdint>
+#include <instances.hpp>
 #include <scene_file.hpp>
 #include <string>
+
+#include "picture_job.hpp"
 
 namespace cumulet::demo {
 
@@ -20,5 +23,10 @@ namespace cumulet::demo {
 /// have no layers. Throws std::runtime_error, one line.
 void save_exr(cumulet_viewer* viewer, const SceneOptions& scene, const cumulet_frame_result& shown,
               const std::string& path);
+
+/// Writes the viewer's picture to a file with the chosen format, layers and denoising. others: the further volumes, as
+/// shown by the viewer. Returns a note of one line, or "". Throws std::runtime_error, one line.
+[[nodiscard]] std::string write_picture_file(cumulet_viewer* viewer, const SceneOptions& scene, const Instances& others,
+                                             const cumulet_frame_result& shown, const PictureFile& file);
 
 }  // namespace cumulet::demo

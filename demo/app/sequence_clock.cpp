@@ -58,8 +58,9 @@ void SequenceClock::advance(double seconds) {
   static_cast<void>(cumulet_sequence_set_time(play->sequence.get(), model_.clock));
 }
 
-void SequenceClock::follow(const SceneSequence& before) {
+void SequenceClock::follow(const SceneSequence& before, bool loads) {
   const auto& play = model_.status.play;
+  if (!loads && std::exchange(plays_when_loaded_, false) && play) model_.playing = true;
   if (!play) return;
   const cumulet_playback_desc now = playback_of(model_.scene.sequence, play->row);
   const bool known = std::exchange(known_, play->sequence.get()) == play->sequence.get();

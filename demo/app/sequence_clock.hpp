@@ -24,12 +24,15 @@ class SequenceClock {
   void step(int frames);
   /// Advances the clock and the sequence.
   void advance(double seconds);
+  /// Plays the next sequence as soon as it is loaded, or not.
+  void play_when_loaded(bool plays) { plays_when_loaded_ = plays; }
   /// Sets the clock after a change of the playback settings, so that the displayed frame stays. before: the settings
-  /// that the viewer has.
-  void follow(const SceneSequence& before);
+  /// that the viewer has. loads: files are still loading.
+  void follow(const SceneSequence& before, bool loads);
 
  private:
   Model& model_;
+  bool plays_when_loaded_ = false;
   const cumulet_sequence* known_ = nullptr;  // sequence that the clock belongs to
 };
 

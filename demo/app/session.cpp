@@ -227,6 +227,10 @@ void Session::draw(unsigned framebuffer) {
   drawn_.display = scene_.display;
 }
 
+std::string Session::write(const PictureFile& file) {
+  return write_picture_file(viewer_.get(), scene_, others_, status_.frame, file);
+}
+
 bool Session::cold() const {
   const bool loads = waits() || status_.compiled;
   return !warm_up_.done && loads && !desired_.paused && status_.frame.width == 0;

@@ -18,6 +18,7 @@
 
 #include "given_settings.hpp"
 #include "model.hpp"
+#include "picture_job.hpp"
 #include "viewer_file.hpp"
 
 namespace cumulet::demo {
@@ -138,6 +139,8 @@ class Session {
   [[nodiscard]] bool has_news() const;
   /// Draws the current image into a framebuffer of the image's size.
   void draw(unsigned framebuffer);
+  /// Writes the current image. Returns a note of one line, or "". Throws std::runtime_error, one line.
+  [[nodiscard]] std::string write(const PictureFile& file);
   /// Returns true if work is not finished.
   [[nodiscard]] bool more() const;
   /// Returns true while a file is read or a grid is built, so that the progress should be polled.

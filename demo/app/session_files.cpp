@@ -232,7 +232,7 @@ void Session::follow_models() {
   }
   opening_model_.made = std::async(std::launch::async, [file = opening_model_.file, own, shared = shared_.get()] {
     const Opened opened{shared, &Shared::opened_model};
-    return own ? own : open_surfaces(file);
+    return own ? own : open_surfaces(file, on_log, shared);
   });
 }
 

@@ -13,6 +13,7 @@
 #include <program.hpp>
 #include <system_error>
 #include <type_traits>
+#include <utility>
 
 #include "sun_dial.hpp"
 
@@ -148,20 +149,97 @@ bool Ui::checkbox(const char* label, const char* tip, bool& value) {
   return changed;
 }
 
+/// Presents another pointer and other keys to a control of ImGui during its lifetime.
+struct Ui::PointerSwap {
+  ImGuiIO& io = ImGui::GetIO();
+  ImVec2 pointer = io.MousePos;
+  bool ctrl = io.KeyCtrl;
+  bool shift = io.KeyShift;
+  bool alt = io.KeyAlt;
+
+  PointerSwap() = default;
+  PointerSwap(const PointerSwap&) = delete;
+  PointerSwap& operator=(const PointerSwap&) = delete;
+  ~PointerSwap() {
+    io.MousePos = pointer;
+    io.KeyCtrl = ctrl;
+    io.KeyShift = shift;
+    io.KeyAlt = alt;
+  }
+};
+
+namespace {
+
+template <class Number>
+std::string text_of(Number number) {
+  if constexpr (std::is_floating_point_v<Number>)
+    return settings::number_text(number);
+  else
+    return std::to_string(number);
+}
+
+}  // namespace
+
+template <class Number>
+Number Ui::within_limits(const char* label, bool typing, Number number, Number least, Number most,
+                         const std::optional<settings::Range>& typed) {
+  refused_.reset();
+  if (number >= least && number <= most) return number;
+  if constexpr (std::is_floating_point_v<Number>)
+    if (!std::isfinite(number)) return std::isnan(number) || number < Number{} ? least : most;
+  if (!typing) return std::clamp(number, least, most);
+  const auto given = static_cast<double>(number);
+  const settings::Range range =
+      typed.value_or(settings::Range{static_cast<double>(least), static_cast<double>(most), false});
+  if (range.holds(given)) return number;
+  const Number limit =
+      range.open ? (given > 0.0 ? most : least) : static_cast<Number>(std::clamp(given, range.least, range.most));
+  const std::string line = std::string(label) + ": " + text_of(number) + " " + range.refusal();
+  refused_ = Refused{label, line + "; set to " + text_of(limit)};
+  return limit;
+}
+
 template <class Number>
 bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
                const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+  constexpr float fine = 0.1f;  // speed of a drag with Shift
   begin_row(label);
-  Number edited = value;
-  const bool changed =
-      ImGui::SliderScalar((std::string("##") + label).c_str(), type, &edited, &least, &most, format, flags);
+  const std::string id = std::string("##") + label;
+  const bool typing = ImGui::TempInputIsActive(ImGui::GetID(id.c_str()));
+  const bool dragged =
+      !typing && ImGui::GetActiveID() == ImGui::GetID(id.c_str()) && pressed_ && pressed_->label == label;
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const ImVec2 end(corner.x + ImGui::CalcItemWidth(), corner.y + ImGui::GetFrameHeight());
+  const bool enabled = (ImGui::GetCurrentContext()->CurrentItemFlags & ImGuiItemFlags_Disabled) == 0;
+  const bool over = enabled && ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect(corner, end);
+  const bool again = over && pressed_ && pressed_->label == label && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
+  const Number before = again ? static_cast<Number>(pressed_->value) : value;
+  Number edited = before;
+  bool changed = false;
+  {
+    PointerSwap swap;
+    // A double click is Ctrl+click for ImGui.
+    if (again) swap.io.KeyCtrl = true;
+    if (dragged) {
+      pressed_->pointer += swap.io.MouseDelta.x * (swap.io.KeyShift ? fine : 1.0f);
+      swap.io.MousePos.x = pressed_->pointer;
+    }
+    changed = ImGui::SliderScalar(id.c_str(), type, &edited, &least, &most, format, flags);
+  }
+  if (over && !typing && !again && ImGui::IsMouseClicked(ImGuiMouseButton_Left))
+    pressed_ = Pressed{label, static_cast<double>(value),
+                       time_ + static_cast<double>(ImGui::GetIO().MouseDoubleClickTime), ImGui::GetIO().MousePos.x};
   remember(label, tip);
-  if (!changed) return false;
-  if constexpr (std::is_floating_point_v<Number>)
-    if (!std::isfinite(edited)) return false;
-  const bool holds = edited >= least && edited <= most;
-  if (typed && !holds && !typed->holds(static_cast<double>(edited))) return false;
-  value = typed ? edited : std::clamp(edited, least, most);
+  if (again && before != value) {
+    value = before;
+    return true;
+  }
+  if (changed) edited = within_limits(label, typing, edited, least, most, typed);
+  // Each digit that is typed changes the number, and only the last one counts.
+  if (refused_ && refused_->label == label && !ImGui::TempInputIsActive(ImGui::GetID(id.c_str())))
+    refusals_.push_back(std::exchange(refused_, std::nullopt)->text);
+  if (!changed || edited == value) return false;
+  value = edited;
   return true;
 }
 
@@ -202,8 +280,14 @@ bool Ui::integer(const char* label, const char* tip, std::uint32_t& value) {
 bool Ui::numbers(const char* label, const char* tip, std::span<double> values, float speed) {
   begin_row(label);
   std::vector<double> edited(values.begin(), values.end());
-  const bool changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, edited.data(),
-                                          static_cast<int>(edited.size()), speed, nullptr, nullptr, "%.4g");
+  bool changed = false;
+  {
+    // ImGui drags slowly with Alt, and fast with Shift.
+    PointerSwap swap;
+    swap.io.KeyAlt = std::exchange(swap.io.KeyShift, false);
+    changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, edited.data(),
+                                 static_cast<int>(edited.size()), speed, nullptr, nullptr, "%.4g");
+  }
   remember(label, tip);
   if (!changed || !std::ranges::all_of(edited, [](double one) { return std::isfinite(one); })) return false;
   std::ranges::copy(edited, values.begin());

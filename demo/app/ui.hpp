@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "ramp_edit.hpp"
@@ -40,7 +41,8 @@ class Ui {
   static void heading(const char* text);
   bool button(const char* label, const char* tip, ImVec2 size = {});
   bool checkbox(const char* label, const char* tip, bool& value);
-  /// Draws a slider. typed: range of values that are typed after Ctrl+click; nullopt: the slider's range.
+  /// Draws a slider. A double click or Ctrl+click types a number, and a drag with Shift is fine. typed: range of typed
+  /// numbers; nullopt: the slider's range.
   bool slider(const char* label, const char* tip, float& value, float least, float most, const char* format,
               ImGuiSliderFlags flags = 0, const std::optional<settings::Range>& typed = std::nullopt);
   bool slider(const char* label, const char* tip, double& value, double least, double most, const char* format,
@@ -83,6 +85,11 @@ class Ui {
   /// click.
   [[nodiscard]] bool resets(bool differs) const;
 
+  /// Returns lines about typed numbers that were refused since the last call, because a limit excludes them.
+  [[nodiscard]] std::vector<std::string> take_refusals() { return std::exchange(refusals_, {}); }
+  /// Returns true if the last click of a slider may become a double click, which types its value.
+  [[nodiscard]] bool may_become_double_click() const { return pressed_ && time_ < pressed_->until; }
+
   /// Stores the position of the last control and shows its tooltip. Call it for controls that are drawn directly with
   /// ImGui.
   void remember(const char* label, const char* tip);
@@ -107,12 +114,32 @@ class Ui {
   // near: index of the point under the mouse.
   void draw_curve(const CurveArea& area, const settings::RampPoints& points, const RampView& view,
                   std::optional<std::size_t> near, const std::vector<float>& heights, float reach) const;
+  // Returns the number that a slider takes: within its range, or within the limits of typed numbers.
+  template <class Number>
+  Number within_limits(const char* label, bool typing, Number number, Number least, Number most,
+                       const std::optional<settings::Range>& typed);
   template <class Number>
   bool slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
              const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed);
 
+  // The slider that was pressed last.
+  struct Pressed {
+    std::string label;
+    double value;   // before the click, which a double click restores
+    double until;   // time until which a second click is a double click
+    float pointer;  // horizontal position for the slider; it moves slowly while Shift is held
+  };
+  struct PointerSwap;
+  struct Refused {
+    std::string label;
+    std::string text;
+  };
+
   float scale_ = 1.0f;
   double time_ = 0.0;
+  std::optional<Pressed> pressed_;
+  std::optional<Refused> refused_;  // of a number that is being typed
+  std::vector<std::string> refusals_;
   Controls last_;
   Controls drawn_;
   std::string wanted_;

@@ -249,9 +249,10 @@ void Window::draw_ui() {
 
 void Window::swap() { glfwSwapBuffers(window_.get()); }
 
-Window::Context Window::make_shared_context() const {
+// Needs the hints that the window's constructor has set.
+Window::Context Window::make_hidden(GLFWwindow* shared_with) {
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
-  Context context(glfwCreateWindow(1, 1, "Cumulet", nullptr, window_.get()));
+  Context context(glfwCreateWindow(1, 1, "Cumulet", nullptr, shared_with));
   glfwWindowHint(GLFW_VISIBLE, GLFW_TRUE);
   if (context == nullptr) throw std::runtime_error("no OpenGL context for the viewer: " + glfw_error());
   return context;

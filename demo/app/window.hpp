@@ -54,7 +54,9 @@ class Window {
 
   /// Creates a context for another thread that shares objects with the window's. Create and destroy it in this thread
   /// during the window's lifetime. Throws std::runtime_error, one line.
-  [[nodiscard]] Context make_shared_context() const;
+  [[nodiscard]] Context make_shared_context() const { return make_hidden(window_.get()); }
+  /// Creates a context as make_shared_context(), but one that shares no objects.
+  [[nodiscard]] static Context make_context() { return make_hidden(nullptr); }
   /// Makes a context current in the calling thread; null releases it.
   static void make_current(GLFWwindow* context);
   /// Returns the address of a GL function, for cumulet.h and glad.
@@ -68,6 +70,7 @@ class Window {
     ~Terminate();
   };
   void listen();
+  [[nodiscard]] static Context make_hidden(GLFWwindow* shared_with);
   [[nodiscard]] std::pair<double, double> pixels_per_unit() const;
 
   Terminate glfw_;

@@ -43,6 +43,9 @@ struct PngOptions {
 void write_png(const std::string& path, const Image& image, const PngOptions& options = {});
 /// Writes bytes, width x height x 4, straight alpha; the first pixel is at the top left.
 void write_png(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba);
+/// Writes lossless WebP from bytes as write_png. The sides may have up to 16383 pixels. Throws also if the programs
+/// were built without WebP.
+void write_webp(const std::string& path, std::uint32_t width, std::uint32_t height, std::span<const std::uint8_t> rgba);
 /// Writes OpenEXR with the channels R, G, B, A as one unnamed layer (layers.hpp). Values stay linear and unchanged.
 void write_exr(const std::string& path, const Image& image);
 /// Writes a portable float map: RGB without alpha, little-endian, bottom row first. Values stay linear and unchanged.

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <file.hpp>
 #include <filesystem>
+#include <functional>
 #include <headless.hpp>
 #include <image.hpp>
 #include <iostream>
@@ -26,8 +27,10 @@
 #include "aovs.hpp"
 #include "checkpoint.hpp"
 #include "denoised.hpp"
+#include "early_pictures.hpp"
 #include "fire.hpp"
 #include "frame_plan.hpp"
+#include "frame_report.hpp"
 #include "info.hpp"
 #include "instances.hpp"
 #include "memory.hpp"
@@ -39,6 +42,7 @@
 #include "render_viewer.hpp"
 #include "settled.hpp"
 #include "stats.hpp"
+#include "time_limit.hpp"
 #include "transforms.hpp"
 
 namespace {
@@ -46,9 +50,9 @@ namespace {
 using cumulet::demo::check;
 using cumulet::demo::Checkpoint;
 using cumulet::demo::driver_of;
+using cumulet::demo::EarlyPictures;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
-using cumulet::demo::Moment;
 using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
 using cumulet::demo::PlannedFrame;
@@ -132,25 +136,6 @@ void print_fire(const cumulet_medium_desc& medium, Progress& progress) {
 
 constexpr double draw_only_ms = -1.0;  // budget of a frame that traces no samples
 constexpr double budget_ms = 200.0;    // interval of progress updates, and the maximum delay of Ctrl-C
-
-/// The time limit. The clock starts at construction.
-class Limit {
- public:
-  explicit Limit(const std::optional<double>& seconds) : seconds_(seconds) {}
-  [[nodiscard]] double over() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  [[nodiscard]] bool reached() const { return seconds_ && over() >= *seconds_; }
-  /// Returns the budget of the next frame in milliseconds, so that it ends in time.
-  [[nodiscard]] double budget() const {
-    return seconds_ ? std::clamp(1e3 * (*seconds_ - over()), min_ms, budget_ms) : budget_ms;
-  }
-
- private:
-  static constexpr double min_ms = 5.0;
-  std::optional<double> seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 cumulet_frame_desc frame_of(const RenderOptions& options) {
   cumulet_frame_desc frame{};
@@ -264,24 +249,26 @@ void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint
                                               "); the result will not be bit-identical to an uninterrupted render"));
 }
 
-/// Renders until the image has all samples, the time limit is reached, or a signal interrupts it.
+/// Renders until the image has all samples, the time limit is reached, or a signal interrupts it. whole: called after
+/// each frame that leaves every pixel with a sample.
 Traced trace(const Viewer& viewer, const RenderOptions& options, const std::optional<Checkpoint>& from,
-             Progress& progress) {
+             Progress& progress, const std::function<void()>& whole) {
   if (from) resume(viewer, options, *from, progress);
-  const Limit limit(options.time_limit);
+  const cumulet::demo::TimeLimit limit(options.time_limit);
   cumulet_frame_result frame{};
   bool began = from.has_value();
   auto kept = Clock::now();
   while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
     // The time limit does not apply until each pixel has a sample.
     if (frame.width > 0 && limit.reached()) return Traced::late;
-    frame = render_frame(viewer, options, limit.budget());
+    frame = render_frame(viewer, options, limit.budget(budget_ms));
     if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
     if (frame.width > 0 || frame.progress > 0.0) {
       began = true;
       progress.render(cumulet::demo::part_done(frame.progress, limit.over(), options.time_limit),
                       static_cast<double>(stats_of(viewer).samples));
     }
+    if (frame.width > 0 && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) whole();
     const double since = std::chrono::duration<double>(Clock::now() - kept).count();
     if (!options.checkpoint.empty() && began && since >= options.checkpoint_every) {
       try_to_keep(viewer, options, progress);
@@ -294,16 +281,18 @@ Traced trace(const Viewer& viewer, const RenderOptions& options, const std::opti
   return Traced::stopped;
 }
 
-void print_ending(const RenderOptions& options, Traced traced, double measured, double samples, Progress& progress) {
+void print_ending(const RenderOptions& options, Traced traced, double measured, double samples, double seconds,
+                  Progress& progress) {
   using cumulet::demo::Ending;
   // The margin covers the library's single-precision sums.
   const double target = 0.01 * 1.0001 * options.scene.sampling.noise_target_percent;
   const auto noise = std::isfinite(measured) ? std::optional(measured) : std::nullopt;
   Ending ending = target > 0.0 && noise && *noise <= target ? Ending::noise : Ending::samples;
   if (traced == Traced::late) ending = Ending::time;
-  print_line(progress, options.output + ": " +
-                           cumulet::demo::ending_line(ending, noise, samples,
-                                                      options.scene.sampling.noise_target_percent, options.time_limit));
+  print_line(progress,
+             options.output + ": " +
+                 cumulet::demo::ending_line(ending, noise, samples, options.scene.sampling.noise_target_percent,
+                                            options.time_limit, seconds));
 }
 
 /// Returns the denoiser network; "": none is requested, or none exists, which is logged.
@@ -382,9 +371,16 @@ class Studio {
   }
 
   /// Renders all samples, resuming from a checkpoint if there is one.
-  Traced trace(const RenderOptions& options, const std::optional<Checkpoint>& from) {
+  Traced trace(const RenderOptions& options, const std::optional<Checkpoint>& from, EarlyPictures early) {
     warm_up(viewer_, options, progress_);
-    return ::trace(viewer_, options, from, progress_);
+    const auto start = Clock::now();
+    const Traced traced = ::trace(viewer_, options, from, progress_, [&] {
+      if (!early.due(seconds_since(start_))) return;
+      write_early(options);
+      early.written(seconds_since(start_));
+    });
+    traced_seconds_ = seconds_since(start);
+    return traced;
   }
 
   /// Throws unless the traced volume is the interpolated one. The library may substitute another frame.
@@ -412,8 +408,11 @@ class Studio {
   /// Writes a checkpoint, so that another run can continue after the time limit.
   void keep_samples(const RenderOptions& options) { try_to_keep(viewer_, options, progress_); }
 
-  /// Logs the result of the written image. Throws if rendering was interrupted.
-  void print_result(const RenderOptions& options, Traced traced) {
+  /// Logs the result of the written image. always: even without a noise target or time limit. Throws if rendering was
+  /// interrupted.
+  void print_result(const RenderOptions& options, Traced traced, bool always) {
+    double noise = 0.0;
+    if (always) check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
     const cumulet_stats stats = stats_of(viewer_);
     const cumulet_sampling_desc& sampling = options.scene.sampling;
     const cumulet::image::Windows windows =
@@ -425,8 +424,9 @@ class Studio {
                     pixels * sampling.samples);
       throw std::runtime_error(options.output + ": interrupted: contains the first " + text.data());
     }
-    if (options.time_limit || sampling.noise_target_percent > 0.0f)
-      print_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, progress_);
+    if (always || options.time_limit || sampling.noise_target_percent > 0.0f)
+      print_ending(options, traced, stats.noise, static_cast<double>(stats.samples) / pixels, traced_seconds_,
+                   progress_);
   }
 
   void write_trace(const RenderOptions& options) const {
@@ -434,6 +434,20 @@ class Studio {
   }
 
  private:
+  static double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
+  /// Writes the image so far. A failure is logged, because the disk may have space at the end.
+  void write_early(const RenderOptions& options) {
+    try {
+      const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, network_, progress_);
+      cumulet::demo::write_picture(viewer_, options, others_, denoised, progress_);
+    } catch (const std::exception& error) {
+      print_line(progress_, std::string("warning: the image so far was not written: ") + error.what());
+    }
+  }
+
   static const std::string& first_file(const SceneOptions& scene) {
     if (!scene.volume.empty()) return scene.volume;
     if (!scene.others.empty()) return scene.others.front().volume;
@@ -503,8 +517,9 @@ class Studio {
       progress_.stage("loading " + file);
       cumulet_surfaces* own = nullptr;
       if (file == scene.surfaces) check(viewer_, cumulet_get_surfaces(viewer_.get(), &own));
-      models_.give(file, own != nullptr ? cumulet::demo::SurfacesPtr(own, cumulet_surfaces_release)
-                                        : cumulet::demo::open_surfaces(file));
+      models_.give(file, own != nullptr
+                             ? cumulet::demo::SurfacesPtr(own, cumulet_surfaces_release)
+                             : cumulet::demo::open_surfaces(file, cumulet::demo::Messages::print, &messages_));
       check_not_interrupted();
     }
     models_.show(viewer_.get(), scene.models);
@@ -553,6 +568,8 @@ class Studio {
   }
 
   Progress progress_;
+  Clock::time_point start_ = Clock::now();
+  double traced_seconds_ = 0.0;
   cumulet::demo::Messages messages_{progress_};
   Timeline timeline_;
   // Looked up first, so that an error is logged before rendering starts.
@@ -572,6 +589,13 @@ std::optional<Checkpoint> checkpoint_for(const RenderOptions& options) {
   return cumulet::demo::read_checkpoint(options.checkpoint, cumulet::demo::checkpoint_of(options));
 }
 
+/// Returns when images are written before the end. Beside other files, the image says that they are complete.
+EarlyPictures early_pictures(const RenderOptions& options) {
+  constexpr double first_seconds = 10.0;
+  const bool alone = options.checkpoint.empty() && options.stats.empty() && options.trace.empty();
+  return EarlyPictures(options.format == OutputFormat::png && alone ? std::optional(first_seconds) : std::nullopt);
+}
+
 void render(const RenderOptions& options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
@@ -582,7 +606,7 @@ void render(const RenderOptions& options) {
   studio.load(options.scene);
   studio.remark(options.scene);
   studio.choose_in_surfaces(options);
-  const Traced traced = studio.trace(options, from);
+  const Traced traced = studio.trace(options, from, early_pictures(options));
   if (traced == Traced::stopped && !options.checkpoint.empty())
     throw std::runtime_error(options.output + ": interrupted: run the same command to resume from " +
                              options.checkpoint);
@@ -593,7 +617,9 @@ void render(const RenderOptions& options) {
     forget_checkpoint(options.checkpoint);
   }
   studio.write_trace(options);
-  studio.print_result(options, traced);
+  if (options.denoises_by_default && options.denoise != cumulet::demo::Denoise::off)
+    print_line(studio.progress(), options.output + ": denoised (--denoise off keeps the samples)");
+  studio.print_result(options, traced, true);
 }
 
 bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
@@ -676,43 +702,15 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   return studio;
 }
 
-/// Prints one status line per frame.
-class Report {
- public:
-  explicit Report(const FramePlan& plan) : plan_(plan) {}
-  void say(std::size_t index, FrameState state, const std::string& what, Progress* progress) {
-    const Moment number = plan_.frames[index].number;
-    if (progress != nullptr) progress->clear();
-    std::cout << cumulet::demo::frame_line(number, index + 1, plan_.frames.size(), state, what) << std::endl;
-    if (state == FrameState::failed) failed_.push_back(number);
-  }
-  /// Returns the text that the frames from `index` on have not been rendered.
-  [[nodiscard]] std::string not_made(std::size_t index) const {
-    std::vector<Moment> rest;
-    for (std::size_t i = index; i < plan_.frames.size(); ++i) rest.push_back(plan_.frames[i].number);
-    return (rest.size() > 1 ? "frames " : "frame ") + cumulet::demo::frames_text(rest) + " not rendered";
-  }
-  /// Throws if any frame failed.
-  void end() const {
-    if (failed_.empty()) return;
-    throw std::runtime_error(std::to_string(failed_.size()) + " of " + std::to_string(plan_.frames.size()) +
-                             " frames failed: " + cumulet::demo::frames_text(failed_));
-  }
-
- private:
-  const FramePlan& plan_;
-  std::vector<Moment> failed_;
-};
-
 /// Renders a frame: loads its volume, traces, writes.
-void render_frame_of(Studio& studio, const RenderOptions& picture, const PlannedFrame& frame, Report& report,
-                     std::size_t index) {
+void render_frame_of(Studio& studio, const RenderOptions& picture, const PlannedFrame& frame,
+                     cumulet::demo::FrameReport& report, std::size_t index) {
   const auto start = Clock::now();
   Traced traced = Traced::stopped;
   try {
     const std::optional<Checkpoint> from = checkpoint_for(picture);
     studio.load(picture.scene, &frame);
-    traced = studio.trace(picture, from);
+    traced = studio.trace(picture, from, EarlyPictures(std::nullopt));
     if (frame.next && picture.scene.is_shown() && traced != Traced::stopped) studio.require_drawn(*frame.next);
   } catch (const std::runtime_error& error) {
     if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));
@@ -723,7 +721,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
   try {
     studio.write(picture);
     forget_checkpoint(picture.checkpoint);
-    studio.print_result(picture, traced);
+    studio.print_result(picture, traced, false);
   } catch (const std::runtime_error& error) {
     report.say(index, FrameState::failed, error.what(), &studio.progress());
     throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));
@@ -742,7 +740,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
   std::signal(SIGPIPE, SIG_IGN);  // rendering continues if the reader of the status lines exits
   if (!plan.passed_over.empty()) std::fprintf(stderr, "warning: %s\n", one_line(plan.passed_over).c_str());
   std::unique_ptr<Studio> studio;
-  Report report(plan);
+  cumulet::demo::FrameReport report(plan);
   for (std::size_t i = 0; i < plan.frames.size(); ++i) {
     const PlannedFrame& frame = plan.frames[i];
     if (!options.overwrite && cumulet::demo::is_made(frame.output)) {

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace cumulet::demo {
@@ -40,11 +42,17 @@ cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, 
 
 }  // namespace
 
-SurfacesPtr open_surfaces(const std::string& file) {
+SurfacesPtr open_surfaces(const std::string& file, cumulet_log_fn log, void* log_user) {
   cumulet_surfaces* opened = nullptr;
   std::array<char, 1024> error{};
   check(cumulet_surfaces_open(file.c_str(), &opened, error.data(), error.size()), error.data());
-  return {opened, cumulet_surfaces_release};
+  SurfacesPtr surfaces(opened, cumulet_surfaces_release);
+  cumulet_surfaces_info info{};
+  info.struct_size = sizeof info;
+  check(cumulet_surfaces_get_info(opened, &info), "");
+  std::istringstream lines(info.warnings);
+  for (std::string line; std::getline(lines, line);) log(log_user, CUMULET_LOG_WARNING, line.c_str());
+  return surfaces;
 }
 
 const Models::Given* Models::find(const std::string& file) const {

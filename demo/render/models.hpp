@@ -11,8 +11,8 @@ namespace cumulet::demo {
 
 using SurfacesPtr = std::shared_ptr<cumulet_surfaces>;
 
-/// Any thread. Throws std::runtime_error with the library's error text.
-[[nodiscard]] SurfacesPtr open_surfaces(const std::string& file);
+/// Opens a file in any thread and logs its warnings. Throws std::runtime_error with the library's error text.
+[[nodiscard]] SurfacesPtr open_surfaces(const std::string& file, cumulet_log_fn log, void* log_user);
 
 /// A viewer's models (SceneOptions::models). Call from the viewer's thread.
 class Models {

@@ -577,7 +577,7 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
              std::array{Name{"off", Denoise::off}, Name{"fast", Denoise::fast}, Name{"high", Denoise::high}},
              options.denoise,
              "Denoise: fast (filter) or high (Open Image Denoise network; fast if there is no network). An .exr gets "
-             "an additional layer `denoised` (default: off)");
+             "an additional layer `denoised` (default: fast for .png, or as in the scene file; off for other files)");
   add_path(app, group, "--oidn-weights", "DIR", options.denoiser,
            "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
            "$XDG_DATA_HOME)");
@@ -591,6 +591,15 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
              "How to create the OpenGL context without a display (default: auto, which tries EGL, then OSMesa)");
 }
 
+/// Returns the denoising of an image for which --denoise is not given. has_scene: a scene file sets it.
+Denoise default_denoise(const RenderOptions& options, bool has_scene) {
+  const SceneOptions& scene = options.scene;
+  const bool possible = options.format == OutputFormat::png && scene.sampling.view == CUMULET_VIEW_SHADED &&
+                        scene.surface.lighting != CUMULET_SURFACE_LIGHTING_RASTERIZED;
+  const bool wanted = !has_scene || scene.display.denoise != CUMULET_DENOISE_OFF;
+  return possible && wanted ? Denoise::fast : Denoise::off;
+}
+
 }  // namespace
 
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
@@ -599,6 +608,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   app.footer(
       "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.\n"
       "Ctrl-C writes the samples so far and exits with 1; a second Ctrl-C stops at once.\n"
+      "Without --stats, --trace and --checkpoint, a .png is written after 10 s and gets better until the end.\n"
       "For a sequence, one line per frame is printed: frame 12 (3 of 20) done|kept|failed FILE...\n"
       "Frames that cannot be read fail, and the others are rendered; the exit status is then 1.\n"
       "Ctrl-C does not write the current frame of a sequence.");
@@ -629,7 +639,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = max_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr output");
-  check_together(options, app.count("--first-sample") > 0);
+  const bool part = app.count("--first-sample") > 0;
+  options.denoises_by_default = app.count("--denoise") == 0;
+  if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);
+  check_together(options, part);
   // Like every scene setting, it changes the scene hash in the file.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;
   return options;

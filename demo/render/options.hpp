@@ -59,6 +59,7 @@ struct RenderOptions {
   std::optional<double> time_limit;  // seconds from the first sample
   std::uint64_t gpu_memory = 0;      // bytes; 0: no limit
   Denoise denoise = Denoise::off;    // for .exr, the denoised image is an additional layer
+  bool denoises_by_default = false;  // --denoise is not given
   std::string denoiser;              // folder of networks; empty: denoiser_folder()
   std::vector<cumulet_aov> aovs;     // additional layers of an .exr
   bool cryptomatte = false;          // additional layers of an .exr

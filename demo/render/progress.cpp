@@ -79,7 +79,7 @@ double part_done(double part, double seconds, std::optional<double> limit) {
 }
 
 std::string ending_line(Ending ending, std::optional<double> noise, double samples, double target_percent,
-                        std::optional<double> limit) {
+                        std::optional<double> limit, double seconds) {
   const auto number = [](const char* format, double value) {
     std::array<char, 64> text{};
     std::snprintf(text.data(), text.size(), format, value);
@@ -88,7 +88,8 @@ std::string ending_line(Ending ending, std::optional<double> noise, double sampl
   std::string line = "noise " + (noise ? number("%.3g", 100.0 * *noise) + " %" : std::string("unknown"));
   if (target_percent > 0.0) line += " (target " + number("%g", target_percent) + " %)";
   line += " after " + number("%.4g", samples) + (samples == 1.0 ? " sample per pixel" : " samples per pixel");
-  if (ending == Ending::samples) line += ", the maximum";
+  line += " in " + format_duration(seconds);
+  if (ending == Ending::samples && (target_percent > 0.0 || limit)) line += ", the maximum";
   if (ending == Ending::time && limit) line += ", stopped at the time limit of " + number("%g", *limit) + " s";
   return line;
 }

@@ -51,10 +51,10 @@ class Progress {
 /// Reason why rendering ended.
 enum class Ending { samples, noise, time };
 
-/// Returns a summary: "noise 1.87 % (target 2 %) after 91 samples a pixel". noise: relative, nullopt if unknown.
-/// target_percent, limit: as requested, 0 or nullopt if not. samples: per pixel.
+/// Returns a summary: "noise 1.87 % (target 2 %) after 91 samples per pixel in 0:42". noise: relative, nullopt if
+/// unknown. target_percent, limit: as requested, 0 or nullopt if not. samples: per pixel. seconds: of rendering.
 [[nodiscard]] std::string ending_line(Ending ending, std::optional<double> noise, double samples, double target_percent,
-                                      std::optional<double> limit);
+                                      std::optional<double> limit, double seconds);
 
 /// Formats a time as "1:05", "2:01:40" or "0:00".
 [[nodiscard]] std::string format_duration(double seconds);

@@ -26,10 +26,13 @@ struct SurfaceChoice {
 /// A scene and data derived from it, shared by all viewers that show it. Immutable for its users; thread-safe.
 class SurfaceAsset {
  public:
-  SurfaceAsset(surface::ScenePtr scene, std::string name) : scene_(std::move(scene)), name_(std::move(name)) {}
+  /// warnings: of reading the scene, one per line.
+  SurfaceAsset(surface::ScenePtr scene, std::string name, std::string warnings = {})
+      : scene_(std::move(scene)), name_(std::move(name)), warnings_(std::move(warnings)) {}
 
   [[nodiscard]] const surface::Scene& scene() const { return *scene_; }
   [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::string& warnings() const { return warnings_; }
 
   /// Time-independent data of poses, and the world bounds of the triangles at rest.
   struct Rest {
@@ -46,6 +49,7 @@ class SurfaceAsset {
  private:
   surface::ScenePtr scene_;
   std::string name_;
+  std::string warnings_;
   mutable std::mutex rest_mutex_;
   mutable std::optional<Rest> rest_;
   mutable std::mutex mutex_;

@@ -1,9 +1,12 @@
 // Surfaces of the C ABI.
 
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "base/file_path.hpp"
+#include "base/log.hpp"
 #include "surface/gltf_import.hpp"
 #include "surface/triangles.hpp"
 #include "viewer/c_handles.hpp"
@@ -16,6 +19,19 @@ namespace {
 
 viewer::SurfaceAssetPtr asset_of(surface::ScenePtr scene, const std::string& name) {
   return std::make_shared<const viewer::SurfaceAsset>(std::move(scene), name);
+}
+
+/// Imports surfaces and keeps the warnings. import: receives a log and returns the scene.
+template <class Import>
+viewer::SurfaceAssetPtr imported_asset(const std::string& name, Import import) {
+  std::string warnings;
+  const Log log([&warnings](LogLevel level, const char* message) {
+    if (level < LogLevel::warning) return;
+    if (!warnings.empty()) warnings += '\n';
+    warnings += message;
+  });
+  surface::ScenePtr scene = import(log);
+  return std::make_shared<const viewer::SurfaceAsset>(std::move(scene), name, std::move(warnings));
 }
 
 surface::Material material_of(const cumulet_mesh_desc& d, const std::string& what) {
@@ -70,7 +86,7 @@ std::vector<surface::TriangleMesh> meshes_of(const cumulet_triangles_desc& d, co
 cumulet_status cumulet_surfaces_open(const char* path, cumulet_surfaces** out, char* error, size_t error_size) {
   return make_handle(out, error, error_size, [&] {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
-    return asset_of(surface::import_gltf(path, {}), path);
+    return imported_asset(path, [&](const Log& log) { return surface::import_gltf(path, log); });
   });
 }
 
@@ -81,7 +97,9 @@ cumulet_status cumulet_surfaces_from_memory(const void* bytes, size_t size, cons
     const auto file = array_of(static_cast<const std::uint8_t*>(bytes), size, 1, what + ": bytes");
     std::optional<std::filesystem::path> folder;
     if (base_directory != nullptr) folder = FilePath(base_directory).absolute();
-    return asset_of(surface::import_gltf({file.begin(), file.end()}, what, folder, {}), what);
+    return imported_asset(what, [&](const Log& log) {
+      return surface::import_gltf({file.begin(), file.end()}, what, folder, log);
+    });
   });
 }
 
@@ -120,6 +138,7 @@ cumulet_status cumulet_surfaces_get_info(const cumulet_surfaces* surfaces, cumul
     out.primitives = counts.primitives;
     out.textures = counts.textures;
     out.variants = static_cast<uint32_t>(asset.scene().variants.size());
+    copy_text(asset.warnings(), out.warnings, sizeof out.warnings);
     write_desc(info, out, "cumulet_surfaces_info");
   });
 }

@@ -50,6 +50,9 @@ TEST(DroppedFilesTest, FramesOfASequenceAreOpenedAsTheSequence) {
   }
   const std::string sequence = (folder / "fire_##.vdb").string();
   EXPECT_EQ(commands_of(open_dropped({frames[2], frames[0]})), (Commands{{Action::open, sequence}}));
+  EXPECT_TRUE(open_dropped({frames[2], frames[0]}).plays);
+  EXPECT_FALSE(open_dropped({frames[1]}).plays);
+  EXPECT_FALSE(open_dropped({"/one.json", frames[2], frames[0]}).plays) << "the scene says which frame is shown";
   // A single frame is a volume, and so is another file beside frames.
   EXPECT_EQ(commands_of(open_dropped({frames[1]})), (Commands{{Action::open, frames[1]}}));
   EXPECT_EQ(commands_of(open_dropped({frames[1], "/a.vdb"})),

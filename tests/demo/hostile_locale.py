@@ -6,6 +6,7 @@ Usage: hostile_locale.py RENDER VOLUME MODEL HOSTILE_LIBRARY LOCPATH OUT_FOLDER
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -33,7 +34,7 @@ def outputs(render, volume, model, folder, environment):
                     "--noise-target", "0.5", "--denoise", "off", "--stats", str(stats), "-o", str(picture)],
                    environment)
         found[f"bytes of {kind}"] = picture.read_bytes()
-        found[f"lines of {kind}"] = said.replace(str(folder), "")
+        found[f"lines of {kind}"] = re.sub(r" in \d+:\d\d", "", said.replace(str(folder), ""))  # times differ
         numbers = json.loads(stats.read_text())
         found[f"keys of {kind}'s stats"] = sorted(numbers)
     return found

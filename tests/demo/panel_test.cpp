@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #include <algorithm>
 #include <set>
@@ -13,6 +14,7 @@
 #include "model.hpp"
 #include "panel.hpp"
 #include "rows.hpp"
+#include "support/folder.hpp"
 
 namespace {
 
@@ -264,6 +266,119 @@ TEST_P(PanelTest, RightClickResetsASetting) {
   EXPECT_EQ(model_.scene.light.turbidity, default_of<cumulet_sun_sky_desc>().turbidity);
 }
 
+TEST_P(PanelTest, DoubleClickTypesANumber) {
+  select(model_, Part::render);
+  panel_.ui().bring_into_view("Exposure");
+  for (int i = 0; i < 4; ++i) frame();
+  float& exposure = model_.scene.display.exposure_stops;
+  exposure = 2.0f;
+  click("Exposure");
+  EXPECT_NE(exposure, 2.0f) << "a click sets the value at the pointer";
+  EXPECT_TRUE(panel_.ui().may_become_double_click());
+  click("Exposure");
+  EXPECT_EQ(exposure, 2.0f) << "a double click takes that back";
+  ImGui::GetIO().AddInputCharactersUTF8("1.5");
+  for (int i = 0; i < 5; ++i) frame();
+  EXPECT_EQ(exposure, 1.5f);
+}
+
+TEST_P(PanelTest, NumbersBeyondTheLimitsAreReported) {
+  select(model_, Part::render);
+  panel_.ui().bring_into_view("Exposure");
+  for (int i = 0; i < 4; ++i) frame();
+  click("Exposure");
+  click("Exposure");
+  ImGui::GetIO().AddInputCharactersUTF8("5e30");
+  for (int i = 0; i < 6; ++i) frame();
+  EXPECT_TRUE(model_.messages.empty()) << "not while it is typed";
+  ImGui::ClearActiveID();
+  for (int i = 0; i < 3; ++i) frame();
+  ASSERT_EQ(model_.messages.size(), 1u);
+  EXPECT_EQ(model_.messages[0].text.rfind("Exposure: 5e30 is not from ", 0), 0u) << model_.messages[0].text;
+  EXPECT_NE(model_.messages[0].text.find("; set to "), std::string::npos) << model_.messages[0].text;
+}
+
+TEST_P(PanelTest, ShiftDragsSlowly) {
+  select(model_, Part::render);
+  panel_.ui().bring_into_view("Exposure");
+  for (int i = 0; i < 4; ++i) frame();
+  const Rectangle row = *panel_.ui().find("Exposure");
+  const auto at = [&](double part) {
+    return ImVec2(static_cast<float>(row.x + part * row.width), static_cast<float>(row.y + 0.5 * row.height));
+  };
+  ImGuiIO& io = ImGui::GetIO();
+  const auto drag = [&](bool shift) {
+    frame(at(0.5));
+    io.MouseDown[0] = true;
+    frame(at(0.5));
+    frame(at(0.5));
+    const float before = model_.scene.display.exposure_stops;
+    io.KeyShift = shift;
+    frame(at(0.8));
+    const float change = model_.scene.display.exposure_stops - before;
+    io.KeyShift = false;
+    io.MouseDown[0] = false;
+    for (int i = 0; i < 60; ++i) frame(at(0.8));  // so that the next press is no double click
+    return change;
+  };
+  const float normal = drag(false);
+  const float fine = drag(true);
+  EXPECT_GT(normal, 0.0f);
+  EXPECT_NEAR(fine, 0.1f * normal, 0.03f * normal);
+}
+
+TEST_P(PanelTest, MessagesHaveTheirButtons) {
+  show_message(model_, false, "a.vdb: Z is up", 1.0, MessageButton{"Y up", "Stands it on Y.", {Action::choose_up}});
+  for (int i = 0; i < 3; ++i) frame();
+  const Rectangle toast = *panel_.ui().find("Message");
+  const Rectangle view = Panel::viewport(model_, static_cast<double>(ImGui::GetIO().DisplaySize.x),
+                                         static_cast<double>(ImGui::GetIO().DisplaySize.y), GetParam().first);
+  EXPECT_LE(toast.x + toast.width, view.x + view.width);
+  click("Message/Y up");
+  ASSERT_EQ(commands_.size(), 2u);
+  EXPECT_EQ(commands_[0].action, Action::choose_up);
+  EXPECT_EQ(commands_[1].action, Action::dismiss);
+  EXPECT_EQ(commands_[1].text, "a.vdb: Z is up");
+  model_.log_open = true;
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_TRUE(panel_.ui().controls().contains("Clear log"));
+}
+
+TEST_P(PanelTest, RenderDialogStartsAPicture) {
+  const cumulet::test::Folder folder;
+  model_.preferences.folder = folder.path().string();
+  model_.scene.volume = "/a/cloud.vdb";
+  model_.scene.sampling.samples = 32;
+  panel_.render_dialog().open(model_);
+  EXPECT_TRUE(panel_.dialog_open());
+  for (int i = 0; i < 3; ++i) frame();
+  EXPECT_EQ(panel_.render_dialog().settings().samples, 32u);
+  EXPECT_EQ(panel_.render_dialog().settings().file.path, (folder / "cloud-001.png").string());
+  EXPECT_FALSE(panel_.ui().controls().contains("First frame")) << "nothing plays";
+  EXPECT_FALSE(panel_.ui().controls().contains("Layer/normal")) << "a PNG has no layers";
+  panel_.ui().bring_into_view("Start render");
+  for (int i = 0; i < 4; ++i) frame();
+  click("Start render");
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_EQ(commands_[0].action, Action::render);
+  frame();
+  EXPECT_FALSE(panel_.dialog_open());
+}
+
+TEST_P(PanelTest, RenderQueueIsListed) {
+  model_.renders_open = true;
+  model_.renders = {{1, "/a/one.png", RenderEntry::State::done, 1.0, {}, "1920x1080 in 0:12"},
+                    {2, "/a/two.png", RenderEntry::State::running, 0.5, 10.0, "128 / 256 samples"}};
+  for (int i = 0; i < 4; ++i) frame();
+  click("Render 2/Cancel");
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_EQ(commands_[0].action, Action::cancel_render);
+  EXPECT_EQ(commands_[0].text, "2");
+  click("Render 1/Show in folder");
+  ASSERT_EQ(commands_.size(), 2u);
+  EXPECT_EQ(commands_[1].text, "/a/one.png");
+}
+
 TEST_P(PanelTest, EdgeChangesTheWidth) {
   frame();
   frame();
@@ -299,9 +414,11 @@ INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
 TEST(Menus, ReachEveryAction) {
   // Actions of dialogs, of the outliner and of Escape.
   const std::set<Action> elsewhere = {
-      Action::add_volume,      Action::add_model, Action::save_scene_as, Action::save_png,    Action::save_exr,
-      Action::discard_changes, Action::recover,   Action::cancel,        Action::choose_grid, Action::discard_recovery};
-  for (int i = 0; i <= static_cast<int>(Action::quit); ++i) {
+      Action::add_volume,     Action::add_model,        Action::save_scene_as, Action::save_png,
+      Action::save_exr,       Action::discard_changes,  Action::recover,       Action::cancel,
+      Action::choose_grid,    Action::discard_recovery, Action::clear_log,     Action::render,
+      Action::show_in_folder, Action::quit_anyway,      Action::cancel_render, Action::clear_renders};
+  for (int i = 0; i <= static_cast<int>(Action::quit_anyway); ++i) {
     const auto action = static_cast<Action>(i);
     const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {
       return std::ranges::any_of(

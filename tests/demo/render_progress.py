@@ -3,12 +3,14 @@
 Usage: render_progress.py RENDER VOLUME MODEL OUT_FOLDER
 """
 
+import json
 import os
 import pathlib
 import pty
 import re
 import subprocess
 import sys
+import time
 
 
 def shown(arguments, folder):
@@ -36,8 +38,49 @@ def main():
     assert parts == sorted(parts) and parts[-1] == 100, lines
     assert max(lines_with["compiling shaders"]) < min(lines_with["rendering"]), lines
     assert (folder / "picture.png").stat().st_size > 0
+    assert "picture.png: denoised (--denoise off keeps the samples)" in lines, lines
+    last = [line for line in lines if line][-1]
+    assert re.fullmatch(r"picture.png: noise [\d.]+ % after 4 samples per pixel in \d+:\d\d", last), last
+    denoises_by_default(render, volume, folder)
+    gets_better_in_place(render, volume, folder)
     stops_by_noise(render, volume, folder)
     stops_by_time(render, volume, folder)
+
+
+def denoises_by_default(render, volume, folder):
+    """A .png is denoised, unless a flag or the scene file says otherwise. Linear files keep the samples."""
+    def bytes_of(name, *more):
+        shown([render, "--size", "64x48", "--spp", "2", "-o", name, *more], folder)
+        return (folder / name).read_bytes()
+
+    fast, off = (bytes_of(f"{how}.png", volume, "--denoise", how) for how in ("fast", "off"))
+    assert bytes_of("default.png", volume) == fast != off
+    for how, wanted in (("fast", fast), ("off", off)):
+        (folder / "scene.json").write_text(json.dumps({"cumulet_scene": 2, "volumes": [{"file": str(pathlib.Path(volume).resolve())}],
+                                                       "display": {"denoise": how}}))
+        lines = shown([render, "--scene", "scene.json", "--size", "64x48", "--spp", "2", "-o", "scene.png"], folder)
+        assert any("denoised (" in line for line in lines) == (how == "fast"), lines
+    assert bytes_of("default.pfm", volume) == bytes_of("off.pfm", volume, "--denoise", "off")
+
+
+def gets_better_in_place(render, volume, folder):
+    """The file of a long rendering exists before its end. With --stats it does not."""
+    for more, early in (([], True), (["--stats", "stats.json"], False)):
+        picture = folder / "early.png"
+        picture.unlink(missing_ok=True)
+        process = subprocess.Popen([render, volume, "--size", "64x48", "--spp", "60000", "-o", picture.name, *more], cwd=folder,
+                                   stderr=subprocess.DEVNULL)
+        try:
+            began = time.monotonic()
+            # The machine may be busy, so that the first sample comes late.
+            while not picture.exists() and process.poll() is None and time.monotonic() - began < (120 if early else 15):
+                time.sleep(0.1)
+            assert process.poll() is None and picture.exists() == early, (more, time.monotonic() - began)
+            if early:
+                assert picture.read_bytes()[:4] == b"\x89PNG" and time.monotonic() - began > 5
+        finally:
+            process.kill()
+            process.wait()
 
 
 def ending(lines):

@@ -16,6 +16,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import session_content
 import session_input
 import session_light
+import session_render
 import session_saving
 import spans
 from demo_session import assert_alike, assert_differ, assert_drawn, assert_saved, look, Session, SETTLE, shot, shown, SIZE, tab
@@ -151,7 +152,7 @@ def test_alone(s):
     session_light.write_environment(s.out / "sky.hdr", lambda x: x < 8)
     for name, file in (("model", mountains), ("environment", s.out / "sky.hdr")):
         s.play(name, ["frames 5", *shot(f"{name}_empty"), f'drop "{file}"', "frames 3", "wait loaded", "wait converged", "key escape",
-                      "frames 2", *shot(name), *save_as("f12", f"{name}_saved.png"), "frames 3", "key escape", "key escape",
+                      "frames 2", *shot(name), *save_as("ctrl+f12", f"{name}_saved.png"), "frames 3", "key escape", "key escape",
                       *save_as("shift+f12", f"{name}_saved.exr"), "frames 3", "wait converged", *shot(f"{name}_end")], "--spp", "2")
         empty, report, end = s.report(f"{name}_empty"), s.report(name), s.report(f"{name}_end")
         assert not empty["has_content"] and empty["title"] == "Cumulet" and empty["state"] == "", empty
@@ -173,7 +174,8 @@ def test_dropped_together(s):
         shutil.copy(s.explosion, s.out / f"blast_{number}.vdb")
     there = ["frames 3", "wait loaded", "frames 2"]
     s.play("several", ["frames 3", f'drop "{mountains}" "{s.cumulus}" "{s.explosion}"', *there, *shot("several"),
-                       f'drop "{s.out}/blast_3.vdb" "{s.out}/blast_1.vdb"', *there, "key escape", "key .", *there, *shot("frames"),
+                       f'drop "{s.out}/blast_3.vdb" "{s.out}/blast_1.vdb"', *there, 'report "plays.json"', "key escape",
+                       'click "Playhead" 0.05 0.5', "frames 3", "key .", *there, *shot("frames"),
                        *tab("Grids"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', *there, "key ctrl+s", "frames 2", "key ctrl+a",
                        'text "saved.json"', "key enter", *there, *shot("saved")],
            "--spp", "1")
@@ -182,6 +184,7 @@ def test_dropped_together(s):
     assert "mountains.glb" in json.dumps(several["scene"]) and not [m for m in several["messages"] if m["error"]], several
     assert frames["sequence"]["count"] == 3 and "blast_#.vdb" in json.dumps(frames["volumes"][0]), frames
     assert pathlib.Path(frames["volumes"][1]["file"]).name == "explosion_0012.vdb", frames["volumes"]
+    assert s.report("plays")["sequence"]["clock"] > 0, "a dropped sequence plays"
     saved = s.report("saved")
     assert saved["sequence"]["frame"] == frames["sequence"]["frame"] == 2, "another up axis keeps the frame"
     assert frames["title"] == "*blast_#.vdb - Cumulet" and saved["title"] == "saved.json - Cumulet", saved["title"]
@@ -191,12 +194,12 @@ def test_save_whole(s):
     """Saving during a preview saves the first full-resolution image after it. The status line says so meanwhile."""
     # The view changes right before the dialog opens, and no samples are traced while the dialog is open.
     view = lambda x: ["move viewport 0.3 0.5", "down left", f"move viewport {x} 0.5", "up left"]
-    s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("f12", "early.png"), 'report "early.json"', "frames 1",
+    s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("ctrl+f12", "early.png"), 'report "early.json"', "frames 1",
                       "wait converged", "key escape", "frames 2", *shot("rest"),
                       *view(0.5), *save_as("shift+f12", "early.exr"), "wait converged", "frames 2", 'report "exr.json"',
                       "key n", *save_as("shift+f12", "wide.exr"), "wait converged", "frames 2", *shot("wide"),
-                      "key t", "frames 3", *save_as("f12", "turning.png"), "frames 300", 'report "turning.json"', "key t",
-                      *view(0.4), *save_as("f12", "never.png"), *["key escape"] * 4, "wait converged", "frames 3", 'report "end.json"'],
+                      "key t", "frames 3", *save_as("ctrl+f12", "turning.png"), "frames 300", 'report "turning.json"', "key t",
+                      *view(0.4), *save_as("ctrl+f12", "never.png"), *["key escape"] * 4, "wait converged", "frames 3", 'report "end.json"'],
            "--volume", s.cumulus, "--spp", "1", size=["--size", "760x240"])
     early = s.report("early")
     assert early["preview"] and early["picture"] != early["viewport"][2:], "it was a whole picture already"
@@ -221,7 +224,7 @@ def test_scene_file(s):
             "frames 3", 'click "Saved camera"', "frames 2", 'click "Saved camera/near"', "frames 3"]
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
                     *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
-                    "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key f12", "frames 2",
+                    "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key ctrl+f12", "frames 2",
                     "key ctrl+a", 'text "picture.png"', "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", 'text "picture.exr"', "key enter",
                     "frames 3", *shot("messages")],
            "--volume", s.cumulus)
@@ -414,7 +417,7 @@ def main():
     try:
         with os.fdopen(read) as display:
             session.environment["DISPLAY"] = ":" + display.readline().strip()
-        tests = {**vars(session_content), **vars(session_input), **vars(session_light), **vars(session_saving), **globals()}
+        tests = {**vars(session_content), **vars(session_input), **vars(session_light), **vars(session_render), **vars(session_saving), **globals()}
         tests[f"test_{test}"](session)
     finally:
         server.terminate()

@@ -369,6 +369,28 @@ TEST_F(CApiSurfaces, FileInMemoryReadsOnlyFromItsFolder) {
             CUMULET_ERROR_INVALID_ARGUMENT);
 }
 
+TEST_F(CApiSurfaces, WarningsOfAFileAreKept) {
+  std::ifstream file(path_);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  char error[512] = "";
+  cumulet_surfaces* surfaces = nullptr;
+  ASSERT_EQ(cumulet_surfaces_open(path_.c_str(), &surfaces, error, sizeof error), CUMULET_OK) << error;
+  EXPECT_STREQ(info_of(surfaces).warnings, "");
+  cumulet_surfaces_release(surfaces);
+  const std::string mesh = R"({"POSITION": 0})";
+  text.insert(text.find(mesh) + mesh.size(), R"(, "material": 0)");
+  text.insert(text.rfind('}'), R"(, "images": [{"uri": "gone.png"}], "textures": [{"source": 0}],
+    "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])");
+  ASSERT_EQ(cumulet_surfaces_from_memory(text.data(), text.size(), folder_.path().string().c_str(), "mine", &surfaces,
+                                         error, sizeof error),
+            CUMULET_OK)
+      << error;
+  const std::string warnings = info_of(surfaces).warnings;
+  EXPECT_EQ(warnings.rfind("mine: ", 0), 0U) << warnings;
+  EXPECT_NE(warnings.find("gone.png"), std::string::npos) << warnings;
+  cumulet_surfaces_release(surfaces);
+}
+
 TEST_F(CApiSurfaces, ABinaryFileInMemoryNeedsNoFolder) {
   std::string json = R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "buffers": [{"byteLength": 36}],

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <timeline.hpp>
 #include <vector>
 
+#include "early_pictures.hpp"
 #include "held_lines.hpp"
 #include "progress.hpp"
 
@@ -32,17 +34,29 @@ TEST(Progress, CountsTowardTheNearestLimit) {
 }
 
 TEST(Progress, LastLineGivesTheReasonForStopping) {
-  EXPECT_EQ(ending_line(Ending::noise, 0.01874, 91.0, 2.0, std::nullopt),
-            "noise 1.87 % (target 2 %) after 91 samples per pixel");
-  EXPECT_EQ(ending_line(Ending::samples, 0.024, 64.0, 2.0, 30.0),
-            "noise 2.4 % (target 2 %) after 64 samples per pixel, the maximum");
-  EXPECT_EQ(ending_line(Ending::time, 0.1, 10.26, 0.0, 30.0),
-            "noise 10 % after 10.26 samples per pixel, stopped at the time limit of 30 s");
-  EXPECT_EQ(ending_line(Ending::samples, std::nullopt, 1.0, 2.0, std::nullopt),
-            "noise unknown (target 2 %) after 1 sample per pixel, the maximum");
-  EXPECT_EQ(ending_line(Ending::noise, 0.0, 16.0, 2.0, std::nullopt),
-            "noise 0 % (target 2 %) after 16 samples per pixel")
+  EXPECT_EQ(ending_line(Ending::noise, 0.01874, 91.0, 2.0, std::nullopt, 42.0),
+            "noise 1.87 % (target 2 %) after 91 samples per pixel in 0:42");
+  EXPECT_EQ(ending_line(Ending::samples, 0.024, 64.0, 2.0, 30.0, 42.0),
+            "noise 2.4 % (target 2 %) after 64 samples per pixel in 0:42, the maximum");
+  EXPECT_EQ(ending_line(Ending::time, 0.1, 10.26, 0.0, 30.0, 30.0),
+            "noise 10 % after 10.26 samples per pixel in 0:30, stopped at the time limit of 30 s");
+  EXPECT_EQ(ending_line(Ending::samples, std::nullopt, 1.0, 2.0, std::nullopt, 42.0),
+            "noise unknown (target 2 %) after 1 sample per pixel in 0:42, the maximum");
+  EXPECT_EQ(ending_line(Ending::noise, 0.0, 16.0, 2.0, std::nullopt, 42.0),
+            "noise 0 % (target 2 %) after 16 samples per pixel in 0:42")
       << "a black picture has none";
+  EXPECT_EQ(ending_line(Ending::samples, 0.031, 64.0, 0.0, std::nullopt, 65.0),
+            "noise 3.1 % after 64 samples per pixel in 1:05");
+}
+
+TEST(EarlyPictures, AreWrittenAtGrowingIntervals) {
+  EarlyPictures pictures(10.0);
+  EXPECT_FALSE(pictures.due(9.9));
+  EXPECT_TRUE(pictures.due(10.0));
+  pictures.written(11.0);
+  EXPECT_FALSE(pictures.due(21.0));
+  EXPECT_TRUE(pictures.due(22.0)) << "twice the time of the last one";
+  EXPECT_FALSE(EarlyPictures(std::nullopt).due(1e9));
 }
 
 TEST(HeldLines, FailureIsPrintedOnceAndInOrder) {

@@ -1360,6 +1360,11 @@ typedef struct cumulet_surfaces_info {
   uint32_t primitives; /**< Parts of meshes, each of one material. */
   uint32_t textures;
   uint32_t variants; /**< Material variants; see cumulet_surface_settings_desc.variant. */
+  /**
+   * Warnings of cumulet_surfaces_open and cumulet_surfaces_from_memory, such as missing textures: one per line, as many
+   * as fit. Surfaces that a viewer loads log their warnings instead.
+   */
+  char warnings[512];
 } cumulet_surfaces_info;
 
 /**
