@@ -122,7 +122,7 @@ class ChannelBytes {
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing) {
     const grid::TetGrid* made = source.grid.get();
     const auto size_of = [&](const grid::ChannelRow& row) -> std::size_t {
-      if (made != nullptr) return row.records(*made).size();
+      if (made != nullptr) return row.records(made->channels).size();
       return row.is_in(source.channels) ? grid::channel_bytes(row.channel, cells) : 0;
     };
     for (const std::size_t record_bytes : {16, 8, 4, 2}) {
@@ -388,7 +388,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     }
     for (const grid::ChannelRow& row : grid::channel_table) {
       const ChannelBytes::Range& range = channels.of(row.channel);
-      upload_.add_bytes(location_at(range.at), row.records(*grid).data(), range.size);
+      upload_.add_bytes(location_at(range.at), row.records(grid->channels).data(), range.size);
     }
     upload_.add_bytes(location_at(channels.change().at), grid->change.data(), channels.change().size);
   }

@@ -146,13 +146,14 @@ TEST(ColorField, CellColorIsTheDensityWeightedMean) {
   grid::GridBuilder builder(statistics, few);
   builder.bisect();
   const grid::TetGrid grid = builder.records(grid::CellKind::constant, 1.0F, channels);
-  ASSERT_EQ(grid.color.size(), grid.cells.size());
+  ASSERT_EQ(grid.channels.color.size(), grid.cells.size());
   // Density-weighted color of all cells.
   glm::dvec3 sum(0.0);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     const double volume = 16.0 * 16.0 * 16.0 / 24.0;
     ASSERT_EQ(grid.cells.size(), 24U);
-    sum += volume * glm::unpackHalf2x16(grid.cells[i].data.z).x * glm::dvec3(core::cm_cell_color(grid.color[i]));
+    sum +=
+        volume * glm::unpackHalf2x16(grid.cells[i].data.z).x * glm::dvec3(core::cm_cell_color(grid.channels.color[i]));
   }
   const double left = 5.0 * 256.0 * 3.0;
   const double right = 11.0 * 256.0 * 0.5;
@@ -191,7 +192,8 @@ struct Cells {
 
 float stored_anisotropy(const grid::TetGrid& grid, std::size_t cell) {
   const auto word = [&](std::size_t i) {
-    return i < grid.anisotropy.size() ? std::uint32_t{static_cast<std::uint16_t>(grid.anisotropy[i])} : 0U;
+    return i < grid.channels.anisotropy.size() ? std::uint32_t{static_cast<std::uint16_t>(grid.channels.anisotropy[i])}
+                                               : 0U;
   };
   const std::size_t even = cell & ~std::size_t{1};
   return core::cm_cell_anisotropy(word(even) | (word(even + 1) << 16U), static_cast<std::uint32_t>(cell));
@@ -213,7 +215,7 @@ TEST(AnisotropyField, CellAnisotropyIsTheScatteringWeightedMean) {
     }
     const Cells cells(frame, settings);
     const grid::TetGrid& made = cells.made;
-    ASSERT_EQ(made.anisotropy.size(), made.cells.size());
+    ASSERT_EQ(made.channels.anisotropy.size(), made.cells.size());
     EXPECT_GT(made.cells.size(), 100U);
     std::vector<double> scattering(made.cells.size());
     std::vector<double> forward(made.cells.size());
