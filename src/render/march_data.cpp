@@ -110,6 +110,9 @@ constexpr std::array<GLuint, grid::channel_table.size()> channel_units{
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
 
+// Texels of the pages of channels.
+constexpr std::size_t texel_bytes = 16;
+
 // Byte sizes and offsets of the channels of a grid's cells, in descending size of their records, so that each is
 // aligned. Behind those of 16 bytes is the table of emissive cells, behind those of 8 bytes the change.
 class ChannelBytes {
@@ -138,7 +141,7 @@ class ChannelBytes {
   [[nodiscard]] const Range& emissive() const { return emissive_; }
   [[nodiscard]] const Range& change() const { return change_; }
   // Rounded up to whole texels.
-  [[nodiscard]] std::size_t all() const { return (end_ + 15) / 16 * 16; }
+  [[nodiscard]] std::size_t all() const { return (end_ + texel_bytes - 1) / texel_bytes * texel_bytes; }
 
  private:
   Range append(std::size_t size) { return {std::exchange(end_, end_ + size), size}; }
@@ -345,13 +348,14 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     for (MarchData::Part& part : data_.parts_) {
       const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
       const std::size_t first = data_.channels_.offset() + part.channels;
-      using grid::Channel;
-      part.grid.first_emission = static_cast<std::uint32_t>((first + channels.of(Channel::emission).at) / 16);
-      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive().at) / 16);
-      part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.of(Channel::velocity).at) / 4);
+      for (const grid::ChannelRow& row : grid::channel_table) {
+        const std::size_t unit = row.record_bytes == texel_bytes ? texel_bytes : 4;
+        const int index = static_cast<int>(row.channel);
+        part.grid.first_records[index / 4][index % 4] =
+            static_cast<std::uint32_t>((first + channels.of(row.channel).at) / unit);
+      }
+      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive().at) / texel_bytes);
       part.grid.first_change = static_cast<std::uint32_t>((first + channels.change().at) / 4);
-      part.grid.first_color = static_cast<std::uint32_t>((first + channels.of(Channel::color).at) / 4);
-      part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.of(Channel::anisotropy).at) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.glowing);
     }
   });
