@@ -136,21 +136,21 @@ uint cm_root_leaf(uint root) { return cm_tree_word(CM_GRID.tree - 52u + 2u * roo
 uint cm_root_node(uint root) { return cm_tree_word(CM_GRID.tree - 51u + 2u * root); }
 #else
 #if CM_CHANNELS
-layout(binding = CM_UNIT_CHANNELS) uniform sampler3D cm_emission_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_EMISSION) uniform sampler3D cm_emission_voxels;
 vec3 cm_emission_voxel(ivec3 voxel) {
   return CM_GRID.emission_unit * texelFetch(cm_emission_voxels, voxel - ivec3(CM_GRID.box_min), 0).rgb;
 }
-layout(binding = CM_UNIT_SCATTERING_VOXELS) uniform sampler3D cm_scattering_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_COLOR) uniform sampler3D cm_scattering_voxels;
 vec3 cm_scattering_voxel(ivec3 voxel) {
   return texelFetch(cm_scattering_voxels, voxel - ivec3(CM_GRID.box_min), 0).rgb;
 }
-layout(binding = CM_UNIT_ANISOTROPY_VOXELS) uniform sampler3D cm_anisotropy_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_ANISOTROPY) uniform sampler3D cm_anisotropy_voxels;
 float cm_anisotropy_voxel(ivec3 voxel) {
   return texelFetch(cm_anisotropy_voxels, voxel - ivec3(CM_GRID.box_min), 0).x;
 }
 #endif
 #if CM_VELOCITY
-layout(binding = CM_UNIT_VELOCITY_VOXELS) uniform sampler3D cm_velocity_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_VELOCITY) uniform sampler3D cm_velocity_voxels;
 vec3 cm_velocity_voxel(ivec3 voxel) {
   return texelFetch(cm_velocity_voxels, voxel - ivec3(CM_GRID.box_min), 0).xyz;
 }

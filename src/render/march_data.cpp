@@ -101,10 +101,7 @@ core::CmGrid parameters_of(const scene::MarchSource& source) {
   return grid;
 }
 
-// Texture units of voxels, by channel.
-constexpr std::array<GLuint, grid::channel_table.size()> channel_units{
-    core::CM_UNIT_CHANNELS, core::CM_UNIT_SCATTERING_VOXELS, core::CM_UNIT_ANISOTROPY_VOXELS,
-    core::CM_UNIT_VELOCITY_VOXELS};
+static_assert(core::CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_COUNT <= core::CM_UNIT_CHANGE_VOXELS);
 
 // In front of each tree: 25 pairs, and padding.
 using Roots = std::array<grid::RootEntry, 26>;
@@ -602,7 +599,8 @@ void MarchData::bind(const gl::Functions& gl) const {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
   for (std::size_t i = 0; i < voxel_channels_.size(); ++i) {
-    if (voxel_channels_[i]) gl.BindTextureUnit(channel_units[i], voxel_channels_[i].name());
+    if (voxel_channels_[i])
+      gl.BindTextureUnit(core::CM_UNIT_CHANNEL_VOXELS + static_cast<GLuint>(i), voxel_channels_[i].name());
   }
   if (changes_) gl.BindTextureUnit(core::CM_UNIT_CHANGE_VOXELS, changes_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
