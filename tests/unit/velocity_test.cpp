@@ -67,7 +67,7 @@ TEST(Velocity, CellVelocityIsTheDensityWeightedMean) {
                     })};
   const grid::Cube cube = grid::fit_cube(frame.density);
   EXPECT_FALSE(scene::momentum_of(frame));
-  EXPECT_TRUE(cells_of(frame, cube).velocity.empty());
+  EXPECT_TRUE(cells_of(frame, cube).channels.velocity.empty());
   const auto of = [](const ivec3& p) {
     return vec3(p.x < 5 ? -900.0F : 3.0F, static_cast<float>(p.y - p.z), p.z < 9 ? 20.0F : 0.0F);
   };
