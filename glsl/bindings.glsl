@@ -10,11 +10,9 @@ const int CM_IMAGES = 8;
 
 // Texture units. Kernels of paths and views:
 const int CM_UNIT_CELLS = 0;        // to 5: pages of cell records
-const int CM_UNIT_SCATTERING_VOXELS = 1;
-const int CM_UNIT_ANISOTROPY_VOXELS = 2;
-const int CM_UNIT_VELOCITY_VOXELS = 3;
-const int CM_UNIT_CHANGE_VOXELS = 4;  // or changes of bricks' values
-const int CM_UNIT_CHANNELS = 6;     // channels of cells; or emission of voxels
+const int CM_UNIT_CHANNEL_VOXELS = 0;  // to 4: channels of voxels, in the order of grid::Channel
+const int CM_UNIT_CHANGE_VOXELS = 5;   // or changes of bricks' values
+const int CM_UNIT_CHANNELS = 6;     // channels of cells
 const int CM_UNIT_ENVIRONMENT = 7;  // a page of a WordHeap
 const int CM_UNIT_LAYER_COLOR = 8;
 const int CM_UNIT_SCENE_WORDS = 9;  // a page of a WordHeap, like the tree

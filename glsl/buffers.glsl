@@ -102,11 +102,17 @@ uvec4 cm_record(uint cell, uint part) {
 #endif
 }
 
+// Index of a channel's first record.
+#define CM_FIRST_RECORD(channel) CM_GRID.first_records[(channel) / 4][(channel) % 4]
 #if CM_CHANNELS
-uvec4 cm_emission_record(uint cell) { return texelFetch(cm_channels, int(CM_GRID.first_emission + cell)); }
+uvec4 cm_emission_record(uint cell) {
+  return texelFetch(cm_channels, int(CM_FIRST_RECORD(CM_CHANNEL_EMISSION) + cell));
+}
 uint cm_channel_word(uint word) { return cm_link(texelFetch(cm_channels, int(word >> 2)), word & 3u); }
-uint cm_color_record(uint cell) { return cm_channel_word(CM_GRID.first_color + cell); }
-uint cm_anisotropy_record(uint cell) { return cm_channel_word(CM_GRID.first_anisotropy + (cell >> 1)); }
+uint cm_color_record(uint cell) { return cm_channel_word(CM_FIRST_RECORD(CM_CHANNEL_COLOR) + cell); }
+uint cm_anisotropy_record(uint cell) {
+  return cm_channel_word(CM_FIRST_RECORD(CM_CHANNEL_ANISOTROPY) + (cell >> 1));
+}
 #endif
 #if CM_VELOCITY || CM_MOTION
 uvec2 cm_channel_pair(uint word) {
@@ -115,7 +121,9 @@ uvec2 cm_channel_pair(uint word) {
 }
 #endif
 #if CM_VELOCITY
-uvec2 cm_velocity_record(uint cell) { return cm_channel_pair(CM_GRID.first_velocity + 2u * cell); }
+uvec2 cm_velocity_record(uint cell) {
+  return cm_channel_pair(CM_FIRST_RECORD(CM_CHANNEL_VELOCITY) + 2u * cell);
+}
 #endif
 #if CM_MOTION
 uvec2 cm_change_record(uint cell) { return cm_channel_pair(CM_GRID.first_change + 2u * cell); }
@@ -128,21 +136,21 @@ uint cm_root_leaf(uint root) { return cm_tree_word(CM_GRID.tree - 52u + 2u * roo
 uint cm_root_node(uint root) { return cm_tree_word(CM_GRID.tree - 51u + 2u * root); }
 #else
 #if CM_CHANNELS
-layout(binding = CM_UNIT_CHANNELS) uniform sampler3D cm_emission_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_EMISSION) uniform sampler3D cm_emission_voxels;
 vec3 cm_emission_voxel(ivec3 voxel) {
   return CM_GRID.emission_unit * texelFetch(cm_emission_voxels, voxel - ivec3(CM_GRID.box_min), 0).rgb;
 }
-layout(binding = CM_UNIT_SCATTERING_VOXELS) uniform sampler3D cm_scattering_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_COLOR) uniform sampler3D cm_scattering_voxels;
 vec3 cm_scattering_voxel(ivec3 voxel) {
   return texelFetch(cm_scattering_voxels, voxel - ivec3(CM_GRID.box_min), 0).rgb;
 }
-layout(binding = CM_UNIT_ANISOTROPY_VOXELS) uniform sampler3D cm_anisotropy_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_ANISOTROPY) uniform sampler3D cm_anisotropy_voxels;
 float cm_anisotropy_voxel(ivec3 voxel) {
   return texelFetch(cm_anisotropy_voxels, voxel - ivec3(CM_GRID.box_min), 0).x;
 }
 #endif
 #if CM_VELOCITY
-layout(binding = CM_UNIT_VELOCITY_VOXELS) uniform sampler3D cm_velocity_voxels;
+layout(binding = CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_VELOCITY) uniform sampler3D cm_velocity_voxels;
 vec3 cm_velocity_voxel(ivec3 voxel) {
   return texelFetch(cm_velocity_voxels, voxel - ivec3(CM_GRID.box_min), 0).xyz;
 }

@@ -7,7 +7,7 @@ layout(local_size_x = 64) in;
 #include "bindings.glsl"
 #include "shared.glsl"
 #include "cell.glsl"
-#include "lattice.glsl"
+#include "channels.glsl"
 #include "luminance.glsl"
 
 layout(std430, binding = CM_STORAGE_BRICKS_TOGETHER) readonly buffer CmTogether { float cm_together[]; };

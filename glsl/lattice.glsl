@@ -18,11 +18,6 @@
 #define CM_COARSE_CELLS 42u
 #define CM_COARSE_WORDS 86u  // two words per cell, and two words of bits
 
-// Channels of cells beside density.
-#define CM_CHANNEL_EMISSION 0
-#define CM_CHANNEL_COLOR 1
-#define CM_CHANNEL_ANISOTROPY 2
-#define CM_CHANNEL_VELOCITY 3
 // Words of a channel for a cube's cells above bricks: `record` words per cell, and two words of bits.
 CM_FN uint cm_coarse_channel_words(uint record) { return CM_COARSE_CELLS * record + 2u; }
 

@@ -123,7 +123,7 @@ CM_FN CmLightSample cm_sun_sample(vec3 u) {
 
 #if CM_CHANNELS
 
-#include "channels.glsl"
+#include "cell_emission.glsl"
 
 // ---- Emissive cells; their table is made by src/scene/emissive_cells.hpp
 //

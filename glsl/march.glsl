@@ -6,7 +6,7 @@
 #include "trilinear.glsl"
 #endif
 #if CM_CHANNELS
-#include "channels.glsl"
+#include "cell_emission.glsl"
 #endif
 #if CM_MARCH == 0
 #include "march_tet.glsl"

@@ -3,6 +3,7 @@
 // named with it.
 #ifndef CM_PARAMETERS_GLSL
 #define CM_PARAMETERS_GLSL
+#include "channels.glsl"
 
 // Variant macros; path.glsl describes them.
 #ifndef CM_SURFACES
@@ -106,13 +107,12 @@ CM_BLOCK(CmGrid) {
   uint page_shift;        // log2 of cells per page
   uint first_cell;        // first record in its page, or, with several pages, in all of them together
   uint tree;              // first word of the point-location tree in its page, in 4-byte words; its roots are before it
-  uint first_emission;    // first emission record in its page
-  uint first_color;       // first color record, in 4-byte words
-  uint first_anisotropy;  // first record of scattering's mean cosine, in 4-byte words
   float emission_unit;    // radiance per world unit of length of the stored value 1 of voxels
-  uint first_glowing;     // first entry of the table of emissive cells in the page of their channels
+  // First record of each channel in the page of the cells' channels: in texels if records have 16 bytes, else in
+  // 4-byte words.
+  CM_ALIGN(16) uvec4 first_records[(CM_CHANNEL_COUNT + 3) / 4];
+  uint first_glowing;     // first entry of the table of emissive cells in that page, in 16-byte texels
   uint glowing;           // number of its entries
-  uint first_velocity;    // first velocity record in that page, in 4-byte words
   uint moves;             // 1: there are velocities
   uint first_change;      // CM_MOTION only: first record of density changes, in 4-byte words (CmMedium.changes)
   CM_EQUALITY(CmGrid)

@@ -527,8 +527,8 @@ void add_report_options(CLI::App& app, const char* group, RenderOptions& options
   app.add_flag("--json", options.json, "Write --info as JSON")->group(group);
   add(
       app, group, "--aovs", "NAME,...|all", [&](const std::string& text) { parse_aovs(text, options); },
-      "Additional layers (AOVs) of an .exr: volume, transmittance, depth, volume_depth, normal, albedo, error, "
-      "velocity, backward and volume_backward (motion vectors), cryptomatte");
+      "Additional layers (AOVs) of an .exr: " + list_names(settings::named_aovs, ", ") +
+          ", cryptomatte; backward and volume_backward are motion vectors");
   add_path(app, group, "--stats", "FILE.json", options.stats, "Write statistics and timings in SI units");
   add_path(app, group, "--trace", "FILE.json", options.trace,
            "Write a trace of frames, passes and worker jobs for chrome://tracing and Perfetto");

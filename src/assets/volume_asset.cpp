@@ -135,12 +135,8 @@ std::uint64_t VolumeAsset::derived_bytes() const {
   if (latticed_) bytes += latticed_->lattice->bytes();
   if (ramped_ && ramped_->ends) bytes += ramped_->ends->bytes();
   grid::Channels made;
+  if (weighted_) made = weighted_->fields;
   if (glowing_) made.emission = glowing_->emission;
-  if (weighted_) {
-    made.scattering = weighted_->scattering;
-    made.momentum = weighted_->momentum;
-    made.forward = weighted_->forward.value_or(nullptr);
-  }
   bytes += made.bytes();
   return bytes;
 }
@@ -288,7 +284,7 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
     return weighted ? weighing(frame, density_ramp, progress) : Weighing{frame, density_ramp};
   };
   const bool weighs_anew = !weighted_ || weighted_->density_ramp != density_ramp;
-  const bool turns_anew = anisotropic && (weighs_anew || !weighted_->forward);
+  const bool turns_anew = anisotropic && (weighs_anew || !weighted_->anisotropic);
   Weighing at_open{frame_, density_ramp};
   Weighing at_close{close_, density_ramp};
   if (weighs_anew || turns_anew) {
@@ -307,8 +303,10 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
                                   "density", &progress);
       momentum = mean_momentum(std::move(momentum), *at_close.frame, at_close.ramp, progress, log);
     }
-    put(weighted_,
-        Weighted{density_ramp, field(colors, std::move(scattering)), field(motion, std::move(momentum)), std::nullopt});
+    grid::Channels made;
+    made.scattering = field(colors, std::move(scattering));
+    made.momentum = field(motion, std::move(momentum));
+    put(weighted_, Weighted{density_ramp, std::move(made)});
   }
   if (turns_anew) {
     auto forward = in_gl_ ? in_gl_->forward() : scene::forward_of(*at_open.frame, at_open.ramp, &progress);
@@ -316,10 +314,15 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
       const auto closing = scene::forward_of(*at_close.frame, at_close.ramp, &progress);
       forward = scene::mean_of(forward ? &*forward : nullptr, closing ? &*closing : nullptr, "density", &progress);
     }
-    put(weighted_->forward, field(numbers, std::move(forward)));
+    Weighted made{density_ramp, weighted_->fields, true};
+    made.fields.forward = field(numbers, std::move(forward));
+    put(weighted_, std::move(made));
   }
-  return {glowing_->emission, weighted_->scattering, anisotropic ? *weighted_->forward : nullptr, weighted_->momentum,
-          close_ ? ramped(density_ramp, progress).ends : nullptr};
+  grid::Channels made = weighted_->fields;
+  made.emission = glowing_->emission;
+  if (!anisotropic) made.forward = nullptr;
+  made.ends = close_ ? ramped(density_ramp, progress).ends : nullptr;
+  return made;
 }
 
 }  // namespace cumulet::viewer

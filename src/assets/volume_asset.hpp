@@ -189,9 +189,8 @@ class VolumeAsset {
   mutable std::optional<Glowing> glowing_;
   struct Weighted {
     volume::Ramp density_ramp;
-    decltype(grid::Channels::scattering) scattering;
-    decltype(grid::Channels::momentum) momentum;
-    std::optional<decltype(grid::Channels::forward)> forward;
+    grid::Channels fields;
+    bool anisotropic = false;  // whether fields has the anisotropy, if the volume has one
   };
   mutable std::optional<Weighted> weighted_;  // by density
   mutable std::shared_ptr<const VolumeAsset> interpolated_;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -14,15 +15,14 @@
 #include <vector>
 
 #include "base/error.hpp"
-#include "base/luminance.hpp"
 #include "grid/cell.hpp"
 #include "grid/clear_cones.hpp"
+#include "grid/lattice_channel.hpp"
 
 namespace cumulet::grid {
 
 namespace {
 
-using glm::dvec3;
 using glm::ivec3;
 using glm::vec3;
 using glm::vec4;
@@ -316,63 +316,30 @@ class GridBuilder::LeafDensity {
   double to_relative_;
 };
 
-// Computes the emission of leaves. Each of the three components is fitted.
-class GridBuilder::LeafEmission {
+// Sums the voxels of leaves in double precision.
+class GridBuilder::LeafVoxels {
  public:
-  LeafEmission(const RgbField& emission, CellKind cells)
-      : component_{LeafMoments(emission.component(0)), LeafMoments(emission.component(1)),
-                   LeafMoments(emission.component(2))},
-        cells_(cells) {}
-  // Writes the record; returns true if the leaf emits light.
-  bool put(const Node& node, const vec3& centroid, EmissionRecord& record) {
-    const std::array<Moments, 3> moments{component_[0](node, centroid), component_[1](node, centroid),
-                                         component_[2](node, centroid)};
-    record = emission_record(moments, node.shape, centroid, cells_);
-    return emits(moments);
-  }
-
- private:
-  std::array<LeafMoments, 3> component_;
-  CellKind cells_;
-};
-
-// Computes the scattering of leaves: density x color.
-class GridBuilder::LeafScattering {
- public:
-  explicit LeafScattering(const RgbField& scattering)
-      : component_{LeafMoments(scattering.component(0)), LeafMoments(scattering.component(1)),
-                   LeafMoments(scattering.component(2))} {}
-  dvec3 operator()(const Node& node, const vec3& centroid) {
-    return {component_[0](node, centroid).mass, component_[1](node, centroid).mass, component_[2](node, centroid).mass};
-  }
-
- private:
-  std::array<LeafMoments, 3> component_;
-};
-
-// Computes the mean velocity of leaves. BrickSums lose precision where density is thin relative to its brick, and a
-// velocity is a quotient. So within bricks voxels are summed in double precision.
-class GridBuilder::LeafVelocity {
- public:
-  LeafVelocity(const Statistics& density, const MomentumField& momentum)
-      : fields_{&density, &momentum.component(0), &momentum.component(1), &momentum.component(2)},
-        fastest_(momentum.fastest()) {}
-  glm::uvec2 operator()(const Node& node, const vec3& centroid) {
-    std::array<double, 4> sums{};
+  explicit LeafVoxels(std::span<const Statistics* const> fields)
+      : fields_(fields.begin(), fields.end()), found_(fields.size()), rooms_(fields.size()) {}
+  // Returns the masses of the fields.
+  ChannelFields::CellMoments operator()(const Node& node, const vec3& centroid) {
+    ChannelFields::CellMoments sums{};
     if (node.heap == 0) {
-      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = fields_[i]->moments(vec3(node.v0), node.shape).mass;
-    } else {
-      look_up(ivec3(centroid) & ~(volume::brick_size - 1));
-      const BrickTree& tree = brick_tree(kuhn_frame(corner_, volume::brick_size, node.permutation));
-      const std::uint32_t leaves = 512U / std::bit_floor(std::uint32_t{node.heap});
-      const auto voxels = std::span(tree.voxel).subspan(node.heap * leaves - 512U, leaves);
-      for (std::size_t i = 0; i < sums.size(); ++i) {
-        const Found& found = found_[i];
-        sums[i] = found.values == nullptr ? double{found.uniform} * leaves : 0.0;
-        for (std::size_t v = 0; found.values != nullptr && v < voxels.size(); ++v) sums[i] += found.values[voxels[v]];
-      }
+      for (std::size_t i = 0; i < fields_.size(); ++i)
+        sums[i].mass = fields_[i]->moments(vec3(node.v0), node.shape).mass;
+      return sums;
     }
-    return pack_velocity({sums[1], sums[2], sums[3]}, sums[0], fastest_);
+    look_up(ivec3(centroid) & ~(volume::brick_size - 1));
+    const BrickTree& tree = brick_tree(kuhn_frame(corner_, volume::brick_size, node.permutation));
+    const std::uint32_t leaves = 512U / std::bit_floor(std::uint32_t{node.heap});
+    const auto voxels = std::span(tree.voxel).subspan(node.heap * leaves - 512U, leaves);
+    for (std::size_t i = 0; i < fields_.size(); ++i) {
+      const Found& found = found_[i];
+      double& sum = sums[i].mass;
+      sum = found.values == nullptr ? double{found.uniform} * leaves : 0.0;
+      for (std::size_t v = 0; found.values != nullptr && v < voxels.size(); ++v) sum += found.values[voxels[v]];
+    }
+    return sums;
   }
 
  private:
@@ -390,42 +357,71 @@ class GridBuilder::LeafVelocity {
     }
   }
 
-  std::array<const Statistics*, 4> fields_;  // density, then momentum along each axis
-  float fastest_;
+  std::vector<const Statistics*> fields_;
   ivec3 corner_{-1};  // corner of the brick in found_
-  std::array<Found, 4> found_;
-  std::array<volume::BrickValues::Brick, 4> rooms_;
+  std::vector<Found> found_;
+  std::vector<volume::BrickValues::Brick> rooms_;
 };
 
-// Computes all channels of leaves other than density.
+// Computes all channels of leaves other than density. A field that several channels share is summed once.
 class GridBuilder::LeafChannels {
  public:
-  LeafChannels(const Statistics& density, const Channels& channels, CellKind cells) {
-    if (channels.emission) emitted_.emplace(*channels.emission, cells);
-    if (channels.scattering) colored_.emplace(*channels.scattering);
-    if (channels.forward) forward_.emplace(channels.forward->statistics());
-    if (channels.momentum) velocity_.emplace(density, *channels.momentum);
-  }
-  // Writes to the grid's arrays. mass: of the leaf's density. Returns true if the leaf emits light.
-  bool put(const Node& node, const vec3& centroid, double mass, TetGrid& grid, std::uint32_t rank) {
-    bool emits = false;
-    if (emitted_) emits = emitted_->put(node, centroid, grid.emission[rank]);
-    double scattered = mass;
-    if (colored_) {
-      const dvec3 scattering = (*colored_)(node, centroid);
-      grid.color[rank] = pack_color(scattering, mass);
-      scattered = luminance(scattering);
+  // channels: must outlive this object.
+  LeafChannels(const Statistics& density, const std::vector<ChannelFields>& channels, CellKind cells)
+      : cells_(cells), fields_{&density} {
+    for (const ChannelFields& channel : channels) {
+      Part& part = parts_.emplace_back();
+      part.channel = &channel;
+      if (channel.needs_precise_sums()) {
+        part.voxels = std::make_unique<LeafVoxels>(channel.statistics());
+      } else {
+        for (const Statistics* field : channel.statistics()) part.fields.push_back(index_of(field));
+      }
     }
-    if (forward_) grid.anisotropy[rank] = pack_anisotropy((*forward_)(node, centroid).mass, scattered);
-    if (velocity_) grid.velocity[rank] = (*velocity_)(node, centroid);
+    here_.resize(fields_.size());
+  }
+  // Writes the leaf's records. mass: of the leaf's density. Returns true if the leaf emits light.
+  bool put(const Node& node, const vec3& centroid, double mass, ChannelRecords& records, std::uint32_t rank) {
+    here_[0].mass = mass;
+    for (std::size_t i = 0; i < sums_.size(); ++i) here_[i + 1] = sums_[i](node, centroid);
+    bool emits = false;
+    for (const Part& part : parts_) {
+      ChannelFields::CellMoments moments{};
+      if (part.voxels) {
+        moments = (*part.voxels)(node, centroid);
+      } else {
+        for (std::size_t i = 0; i < part.fields.size(); ++i) moments[i] = here_[part.fields[i]];
+      }
+      std::array<std::uint32_t, max_record_words> record{};
+      part.channel->put_record(moments, centroid, node.shape, cells_, record);
+      const ChannelRow& row = row_of(part.channel->channel());
+      std::memcpy(&row.writable(records)[rank * row.record_bytes], record.data(), row.record_bytes);
+      emits = emits || part.channel->emits(moments);
+    }
     return emits;
   }
 
  private:
-  std::optional<LeafEmission> emitted_;
-  std::optional<LeafScattering> colored_;
-  std::optional<LeafMoments> forward_;
-  std::optional<LeafVelocity> velocity_;
+  struct Part {
+    const ChannelFields* channel = nullptr;
+    std::vector<std::size_t> fields{};     // indices in here_
+    std::unique_ptr<LeafVoxels> voxels{};  // in place of fields
+  };
+  std::size_t index_of(const Statistics* field) {
+    const auto found = std::ranges::find(fields_, field);
+    const auto index = static_cast<std::size_t>(found - fields_.begin());
+    if (found == fields_.end()) {
+      fields_.push_back(field);
+      sums_.emplace_back(*field);
+    }
+    return index;
+  }
+
+  CellKind cells_;
+  std::vector<const Statistics*> fields_;  // density, whose mass is given, and others
+  std::vector<LeafMoments> sums_;          // of the others
+  std::vector<Moments> here_;              // of all fields, for the current leaf
+  std::vector<Part> parts_;
 };
 
 CellRecord GridBuilder::record(std::uint32_t index, const vec4& fit, bool emits) const {
@@ -453,10 +449,9 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   const auto count = static_cast<std::uint32_t>(leaf_nodes_.size());
   ProgressPart allocation(progress, 0.0, 0.1, nodes_.size());
   allocation.resize(grid.cells, count);
-  if (channels.emission) allocation.resize(grid.emission, count);
-  if (channels.scattering) allocation.resize(grid.color, count);
-  if (channels.forward) allocation.resize(grid.anisotropy, count);
-  if (channels.momentum) allocation.resize(grid.velocity, count);
+  for (const ChannelRow& row : channel_table) {
+    if (row.is_in(channels)) row.resize(grid.channels, count, allocation);
+  }
   if (channels.ends) allocation.resize(grid.change, count);
   number_nodes(grid, allocation);
 
@@ -465,10 +460,11 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     vec3 high{-3.0e38F};
   };
   tbb::combinable<Box> boxes;
+  const std::vector<ChannelFields> fields = fields_of(*statistics_, channels);
   ProgressPart part(progress, 0.1, 0.9, count);
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     LeafDensity density(*statistics_, channels, cells, grid.density_unit);
-    const auto beside = std::make_unique<LeafChannels>(*statistics_, channels, cells);
+    LeafChannels beside(*statistics_, fields, cells);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -478,7 +474,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
       const float unit = core::cm_shape_unit(shape);
       const vec3 centroid = v0 + core::cm_from_frame(core::cm_frame_centroid(cell_class) * unit, shape);
       const LeafDensity::Of of = density(node, centroid);
-      const bool emits = beside->put(node, centroid, of.mass, grid, rank);
+      const bool emits = beside.put(node, centroid, of.mass, grid.channels, rank);
       if (of.any || emits) {
         for (std::uint32_t i = 0; i < 4; ++i) {
           const vec3 vertex = core::cm_cell_vertex(v0, shape, i);

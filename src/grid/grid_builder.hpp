@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/progress_part.hpp"
+#include "grid/channel_table.hpp"
 #include "grid/refine.hpp"
-#include "grid/rgb_field.hpp"
 #include "grid/statistics.hpp"
 #include "grid/tet_grid.hpp"
 
@@ -59,9 +59,7 @@ class GridBuilder {
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
   class LeafDensity;
-  class LeafEmission;
-  class LeafScattering;
-  class LeafVelocity;
+  class LeafVoxels;
   class LeafChannels;
   // fit: mean and gradient, in units of the grid's density_unit.
   [[nodiscard]] CellRecord record(std::uint32_t index, const glm::vec4& fit, bool emits) const;

@@ -94,7 +94,6 @@ Lattice::Lattice(const Statistics& statistics, const Channels& beside, const Ref
   fill_entries(statistics, progress);
   fill_coarse(statistics, progress);
   for (const ChannelFields& of : fields) channels.push_back(make_channel(of, progress));
-  if (beside.momentum) channels.back().fastest = beside.momentum->fastest();
 }
 
 std::uint64_t Lattice::device_bytes() const {
@@ -250,6 +249,7 @@ LatticeChannel Lattice::make_channel(const ChannelFields& fields, const Progress
   LatticeChannel made;
   made.channel = fields.channel();
   made.numbers = fields.count();
+  made.fastest = fields.fastest();
   fill_bricks(fields, made, progress);
   const std::size_t words = fields.record_words();
   const std::size_t cube_words = core::cm_coarse_channel_words(static_cast<std::uint32_t>(words));
@@ -262,8 +262,9 @@ LatticeChannel Lattice::make_channel(const ChannelFields& fields, const Progress
       const std::span<std::uint32_t> records = std::span(made.coarse).subspan((i + 1) * cube_words, cube_words);
       for_coarse_cells(at.corner, at.log2_size, cube.log2_size, [&](const vec3& v0, std::uint32_t shape) {
         const std::uint32_t cell = core::cm_coarse_cell(v0, shape, vec3(at.corner));
-        fields.put_record(v0, shape, cells, records.subspan(words * cell, words));
-        if (fields.emits(v0, shape)) records[words * CM_COARSE_CELLS + cell / 32] |= 1U << (cell % 32);
+        const ChannelFields::CellMoments moments = fields.moments(v0, shape);
+        fields.put_record(moments, centroid_of(v0, shape), shape, cells, records.subspan(words * cell, words));
+        if (fields.emits(moments)) records[words * CM_COARSE_CELLS + cell / 32] |= 1U << (cell % 32);
       });
       made.entries[entry_about(at.corner, at.log2_size)].coarse = static_cast<std::uint32_t>(i + 1);
     }

@@ -42,7 +42,7 @@ ChannelFields::ChannelFields(Channel channel, const Statistics& density, const C
   }
 }
 
-ChannelNumbers ChannelFields::numbers(const std::array<float, max_fields>& values) const {
+ChannelNumbers ChannelFields::numbers(const std::array<float, max_channel_fields>& values) const {
   switch (channel_) {
     case Channel::emission:
     case Channel::color:
@@ -60,7 +60,7 @@ ChannelNumbers ChannelFields::numbers(const std::array<float, max_fields>& value
 }
 
 std::optional<ChannelNumbers> ChannelFields::even(const ivec3& corner, int log2_size) const {
-  std::array<float, max_fields> values{};
+  std::array<float, max_channel_fields> values{};
   for (std::size_t i = 0; i < used_; ++i) {
     const Statistics::Node& node = fields_[i]->node_at(corner, log2_size);
     if (!node.is_uniform()) return std::nullopt;
@@ -75,13 +75,13 @@ void ChannelFields::fill(const ivec3& corner, std::span<float> out) const {
     float uniform = 0.0F;
     volume::BrickValues::Brick room{};
   };
-  std::array<Found, max_fields> found;
+  std::array<Found, max_channel_fields> found;
   for (std::size_t i = 0; i < used_; ++i) {
     const Statistics::Node& node = fields_[i]->node_at(corner);
     found[i].uniform = node.uniform;
     if (!node.is_uniform()) found[i].values = fields_[i]->values(node, found[i].room);
   }
-  std::array<float, max_fields> values{};
+  std::array<float, max_channel_fields> values{};
   for (std::size_t v = 0; v < volume::brick_voxels; ++v) {
     for (std::size_t i = 0; i < used_; ++i)
       values[i] = found[i].values == nullptr ? found[i].uniform : found[i].values[v];
@@ -90,21 +90,23 @@ void ChannelFields::fill(const ivec3& corner, std::span<float> out) const {
   }
 }
 
-std::array<Moments, 3> ChannelFields::emission(const vec3& v0, std::uint32_t shape) const {
-  return {fields_[0]->moments(v0, shape), fields_[1]->moments(v0, shape), fields_[2]->moments(v0, shape)};
+ChannelFields::CellMoments ChannelFields::moments(const vec3& v0, std::uint32_t shape) const {
+  CellMoments moments{};
+  for (std::size_t i = 0; i < used_; ++i) moments[i] = fields_[i]->moments(v0, shape);
+  return moments;
 }
 
-bool ChannelFields::emits(const vec3& v0, std::uint32_t shape) const {
-  return channel_ == Channel::emission && grid::emits(emission(v0, shape));
+bool ChannelFields::emits(const CellMoments& moments) const {
+  return channel_ == Channel::emission && grid::emits({moments[0], moments[1], moments[2]});
 }
 
-void ChannelFields::put_record(const vec3& v0, std::uint32_t shape, CellKind cells,
+void ChannelFields::put_record(const CellMoments& moments, const dvec3& centroid, std::uint32_t shape, CellKind cells,
                                std::span<std::uint32_t> record) const {
-  const auto mass = [&](std::size_t i) { return fields_[i]->moments(v0, shape).mass; };
+  const auto mass = [&](std::size_t i) { return moments[i].mass; };
   const auto masses = [&](std::size_t first) { return dvec3(mass(first), mass(first + 1), mass(first + 2)); };
   switch (channel_) {
     case Channel::emission: {
-      const EmissionRecord made = emission_record(emission(v0, shape), shape, centroid_of(v0, shape), cells);
+      const EmissionRecord made = emission_record({moments[0], moments[1], moments[2]}, shape, centroid, cells);
       record[0] = glm::floatBitsToUint(made.mean.x);
       record[1] = glm::floatBitsToUint(made.mean.y);
       record[2] = glm::floatBitsToUint(made.mean.z);

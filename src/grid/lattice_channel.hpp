@@ -22,6 +22,10 @@ namespace cumulet::grid {
 /// along the cube's axes relative to the fastest.
 inline constexpr std::size_t max_channel_numbers = 4;
 using ChannelNumbers = std::array<float, max_channel_numbers>;
+/// Maximum number of words of a record.
+inline constexpr std::size_t max_record_words = 4;
+/// Maximum number of fields from which a channel is computed.
+inline constexpr std::size_t max_channel_fields = 4;
 
 /// The fields of a channel over the control cube.
 class ChannelFields {
@@ -40,19 +44,28 @@ class ChannelFields {
   [[nodiscard]] std::optional<ChannelNumbers> even(const glm::ivec3& corner, int log2_size) const;
   /// Writes the values of a brick's voxels: count() * volume::brick_voxels floats.
   void fill(const glm::ivec3& corner, std::span<float> out) const;
-  /// Writes the record of a cell above bricks: record_words() words.
-  void put_record(const glm::vec3& v0, std::uint32_t shape, CellKind cells, std::span<std::uint32_t> record) const;
-  /// Returns true if a cell above bricks emits light.
-  [[nodiscard]] bool emits(const glm::vec3& v0, std::uint32_t shape) const;
+  /// Moments of each of statistics() over a cell.
+  using CellMoments = std::array<Moments, max_channel_fields>;
+  /// Returns the moments over a cell above bricks.
+  [[nodiscard]] CellMoments moments(const glm::vec3& v0, std::uint32_t shape) const;
+  /// Whether records need sums of voxels in double precision. BrickSums lose precision where density is thin relative
+  /// to its brick, and a velocity is a quotient.
+  [[nodiscard]] bool needs_precise_sums() const { return channel_ == Channel::velocity; }
+  /// Writes the record of a cell: record_words() words. centroid: of the cell, in cube space. Only emission uses more
+  /// than the masses of the moments.
+  void put_record(const CellMoments& moments, const glm::dvec3& centroid, std::uint32_t shape, CellKind cells,
+                  std::span<std::uint32_t> record) const;
+  /// Returns true if a cell with these moments emits light.
+  [[nodiscard]] bool emits(const CellMoments& moments) const;
+  /// For velocity: maximum, in voxels per second.
+  [[nodiscard]] float fastest() const { return fastest_; }
 
  private:
-  static constexpr std::size_t max_fields = 4;
   // Converts the fields' values at a voxel to the channel's values.
-  [[nodiscard]] ChannelNumbers numbers(const std::array<float, max_fields>& values) const;
-  [[nodiscard]] std::array<Moments, 3> emission(const glm::vec3& v0, std::uint32_t shape) const;
+  [[nodiscard]] ChannelNumbers numbers(const std::array<float, max_channel_fields>& values) const;
 
   Channel channel_;
-  std::array<const Statistics*, max_fields> fields_{};
+  std::array<const Statistics*, max_channel_fields> fields_{};
   std::size_t used_ = 0;
   bool colored_ = false;  // the scattering has a color
   float fastest_ = 0.0F;

@@ -8,9 +8,9 @@
 
 #include "base/progress.hpp"
 #include "grid/cell.hpp"
+#include "grid/channel_table.hpp"
 #include "grid/own_measure.hpp"
 #include "grid/refine_settings.hpp"
-#include "grid/rgb_field.hpp"
 #include "grid/statistics.hpp"
 #include "grid/view_levels.hpp"
 

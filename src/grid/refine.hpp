@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/progress_part.hpp"
+#include "grid/channel_table.hpp"
 #include "grid/refine_settings.hpp"
-#include "grid/rgb_field.hpp"
 #include "grid/statistics.hpp"
 
 namespace cumulet::grid {

@@ -92,25 +92,4 @@ struct DensityEnds {
   [[nodiscard]] std::uint64_t bytes() const { return open.bytes() + close.bytes(); }
 };
 
-/// Fields that cells store beside density. A null field is absent.
-struct Channels {
-  /// Emitted radiance per world unit of length, linear Rec. 709. It is independent of density.
-  std::shared_ptr<const RgbField> emission;
-  /// Density x color. The product is stored because the mean of products is not the product of means.
-  std::shared_ptr<const RgbField> scattering;
-  /// Scattering (luminance of density x color) x (1 + anisotropy) / 2: the part that is scattered forward.
-  std::shared_ptr<const ScalarField> forward;
-  /// Does not affect light transport, so no cell is split for it.
-  std::shared_ptr<const MomentumField> momentum;
-  /// Shutter ends whose mean is the density of this grid. Cells are split for both ends instead of for the density.
-  std::shared_ptr<const DensityEnds> ends = nullptr;
-
-  bool operator==(const Channels&) const = default;
-  /// Main memory in bytes.
-  [[nodiscard]] std::uint64_t bytes() const {
-    return (emission ? emission->bytes() : 0) + (scattering ? scattering->bytes() : 0) +
-           (forward ? forward->bytes() : 0) + (momentum ? momentum->bytes() : 0) + (ends ? ends->bytes() : 0);
-  }
-};
-
 }  // namespace cumulet::grid

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "grid/cell.hpp"
+#include "grid/channel_table.hpp"
 #include "grid/refine_settings.hpp"
 #include "grid/statistics.hpp"
 
@@ -17,13 +18,6 @@ struct CellRecord {
   glm::uvec4 data;
 };
 static_assert(sizeof(CellRecord) == 32);
-
-/// Emission of a cell as the shaders read it; layout: glsl/channels.glsl.
-struct EmissionRecord {
-  glm::vec3 mean;  ///< radiance per world unit of length
-  std::uint32_t gradient;
-};
-static_assert(sizeof(EmissionRecord) == 16);
 
 /// Returns a cell's emission from the moments of red, green and blue over it. centroid: of the cell, in cube space.
 EmissionRecord emission_record(const std::array<Moments, 3>& moments, std::uint32_t shape, const glm::dvec3& centroid,
@@ -71,14 +65,7 @@ struct TetGrid {
   std::array<RootEntry, 25> roots{};  ///< 24 and an end mark
   std::uint32_t levels = 0;           ///< deepest bisection level of a cell; the roots are level 0
   float density_unit = 1.0F;          ///< grid value of a record's density 1
-  /// One per cell; empty if no cell emits light.
-  std::vector<EmissionRecord> emission;
-  /// One per cell, pack_color(); empty if scattering is white.
-  std::vector<std::uint32_t> color;
-  /// One per cell, pack_anisotropy(); empty if the medium's anisotropy applies.
-  std::vector<std::int16_t> anisotropy;
-  /// One per cell, pack_velocity(); empty if there is no velocity.
-  std::vector<glm::uvec2> velocity;
+  ChannelRecords channels;
   /// One per cell, packed as pack_fit(): half of the change of mean and gradient from shutter open to close. The record
   /// has the value halfway between. Empty if nothing changes.
   std::vector<glm::uvec2> change;
@@ -87,8 +74,7 @@ struct TetGrid {
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
-    return cells.size() * sizeof(CellRecord) + emission.size() * sizeof(EmissionRecord) + color.size() * 4 +
-           anisotropy.size() * 2 + velocity.size() * 8 + change.size() * 8 + tree.size() * 4 + 200;
+    return cells.size() * sizeof(CellRecord) + channels.bytes() + change.size() * 8 + tree.size() * 4 + 200;
   }
 };
 

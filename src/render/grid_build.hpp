@@ -68,7 +68,7 @@ class GridBuild {
   void plan_records();
   // Plans a pass over the leaves. coarse: kernel for cells larger than bricks; fine: for cells within bricks.
   void plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind);
-  // Plans the channels of the cells: emission, velocity, color and anisotropy.
+  // Plans the channels of the cells.
   void plan_channels();
   void plan_channel(std::size_t index);
   void plan_clear_cones();

@@ -101,14 +101,14 @@ core::CmGrid parameters_of(const scene::MarchSource& source) {
   return grid;
 }
 
-// Texture units of voxels, by channel.
-constexpr std::array<GLuint, grid::channel_table.size()> channel_units{
-    core::CM_UNIT_CHANNELS, core::CM_UNIT_SCATTERING_VOXELS, core::CM_UNIT_ANISOTROPY_VOXELS,
-    core::CM_UNIT_VELOCITY_VOXELS};
+static_assert(core::CM_UNIT_CHANNEL_VOXELS + CM_CHANNEL_COUNT <= core::CM_UNIT_CHANGE_VOXELS);
 
 // In front of each tree: 25 pairs, and padding.
 using Roots = std::array<grid::RootEntry, 26>;
 static_assert(sizeof(Roots) == 52 * 4, "glsl/buffers.glsl");
+
+// Texels of the pages of channels.
+constexpr std::size_t texel_bytes = 16;
 
 // Byte sizes and offsets of the channels of a grid's cells, in descending size of their records, so that each is
 // aligned. Behind those of 16 bytes is the table of emissive cells, behind those of 8 bytes the change.
@@ -122,7 +122,7 @@ class ChannelBytes {
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing) {
     const grid::TetGrid* made = source.grid.get();
     const auto size_of = [&](const grid::ChannelRow& row) -> std::size_t {
-      if (made != nullptr) return row.records(*made).size();
+      if (made != nullptr) return row.records(made->channels).size();
       return row.is_in(source.channels) ? grid::channel_bytes(row.channel, cells) : 0;
     };
     for (const std::size_t record_bytes : {16, 8, 4, 2}) {
@@ -138,7 +138,7 @@ class ChannelBytes {
   [[nodiscard]] const Range& emissive() const { return emissive_; }
   [[nodiscard]] const Range& change() const { return change_; }
   // Rounded up to whole texels.
-  [[nodiscard]] std::size_t all() const { return (end_ + 15) / 16 * 16; }
+  [[nodiscard]] std::size_t all() const { return (end_ + texel_bytes - 1) / texel_bytes * texel_bytes; }
 
  private:
   Range append(std::size_t size) { return {std::exchange(end_, end_ + size), size}; }
@@ -345,13 +345,14 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     for (MarchData::Part& part : data_.parts_) {
       const ChannelBytes channels(*part.source, part.cells.count, part.glowing);
       const std::size_t first = data_.channels_.offset() + part.channels;
-      using grid::Channel;
-      part.grid.first_emission = static_cast<std::uint32_t>((first + channels.of(Channel::emission).at) / 16);
-      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive().at) / 16);
-      part.grid.first_velocity = static_cast<std::uint32_t>((first + channels.of(Channel::velocity).at) / 4);
+      for (const grid::ChannelRow& row : grid::channel_table) {
+        const std::size_t unit = row.record_bytes == texel_bytes ? texel_bytes : 4;
+        const int index = static_cast<int>(row.channel);
+        part.grid.first_records[index / 4][index % 4] =
+            static_cast<std::uint32_t>((first + channels.of(row.channel).at) / unit);
+      }
+      part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive().at) / texel_bytes);
       part.grid.first_change = static_cast<std::uint32_t>((first + channels.change().at) / 4);
-      part.grid.first_color = static_cast<std::uint32_t>((first + channels.of(Channel::color).at) / 4);
-      part.grid.first_anisotropy = static_cast<std::uint32_t>((first + channels.of(Channel::anisotropy).at) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.glowing);
     }
   });
@@ -388,7 +389,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     }
     for (const grid::ChannelRow& row : grid::channel_table) {
       const ChannelBytes::Range& range = channels.of(row.channel);
-      upload_.add_bytes(location_at(range.at), row.records(*grid).data(), range.size);
+      upload_.add_bytes(location_at(range.at), row.records(grid->channels).data(), range.size);
     }
     upload_.add_bytes(location_at(channels.change().at), grid->change.data(), channels.change().size);
   }
@@ -598,7 +599,8 @@ void MarchData::bind(const gl::Functions& gl) const {
     if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
   }
   for (std::size_t i = 0; i < voxel_channels_.size(); ++i) {
-    if (voxel_channels_[i]) gl.BindTextureUnit(channel_units[i], voxel_channels_[i].name());
+    if (voxel_channels_[i])
+      gl.BindTextureUnit(core::CM_UNIT_CHANNEL_VOXELS + static_cast<GLuint>(i), voxel_channels_[i].name());
   }
   if (changes_) gl.BindTextureUnit(core::CM_UNIT_CHANGE_VOXELS, changes_.name());
   if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());

@@ -45,10 +45,11 @@ EmissiveTable emissive_table(std::vector<GlowingCell> cells, const grid::Cube& c
 
 EmissiveTable emissive_table(const grid::TetGrid& grid, const Progress* progress) {
   std::vector<GlowingCell> cells;
-  for (std::size_t i = 0; i < grid.emission.size(); ++i) {
+  for (std::size_t i = 0; i < grid.channels.emission.size(); ++i) {
     if (i % 65536 == 0) check(progress);
     const glm::uvec4& data = grid.cells[i].data;
-    if (brightness_of(grid.emission[i]) > 0.0) cells.push_back({{}, glm::uvec2(data.x, data.y), grid.emission[i]});
+    if (brightness_of(grid.channels.emission[i]) > 0.0)
+      cells.push_back({{}, glm::uvec2(data.x, data.y), grid.channels.emission[i]});
   }
   return emissive_table(std::move(cells), grid.cube, progress);
 }

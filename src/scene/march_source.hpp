@@ -58,7 +58,7 @@ struct MarchSource {
   [[nodiscard]] int brick_side() const { return linear ? grid::brick_corners : volume::brick_size; }
   [[nodiscard]] bool has(grid::Channel channel) const {
     const grid::ChannelRow& row = grid::row_of(channel);
-    return row.is_in(channels) || (grid && !row.records(*grid).empty());
+    return row.is_in(channels) || (grid && !row.records(grid->channels).empty());
   }
   [[nodiscard]] bool emits() const { return has(grid::Channel::emission); }
   [[nodiscard]] bool colored() const { return has(grid::Channel::color); }

@@ -13,11 +13,7 @@ void ModelStage::add_model(std::shared_ptr<ModelInstance> model, std::uint64_t i
   failures_.retire();
   host_.sync();
   if (find(*model) != shown_.end()) throw Error(ErrorCode::invalid_argument, "the model is already in the viewer");
-  Shown shown;
-  shown.id = id;
-  shown.listener = model->listen([host = &host_] { host->notify(); });
-  shown.model = std::move(model);
-  shown_.push_back(std::move(shown));
+  shown_.emplace_back(std::move(model), id, host_);
   host_.sync();  // starts posing its surfaces
   host_.touch();
 }
@@ -34,17 +30,14 @@ void ModelStage::remove_model(const ModelInstance& model) {
 }
 
 std::vector<ModelStage::Shown>::iterator ModelStage::find(const ModelInstance& model) {
-  return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.model.get() == &model; });
+  return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.object.get() == &model; });
 }
 
 std::size_t ModelStage::sync() {
   std::size_t changed = 0;
   for (Shown& shown : shown_) {
-    const std::uint64_t revision = shown.model->revision();
-    if (revision == shown.revision) continue;
     const SurfaceAssetPtr before = shown.settings.surfaces;
-    shown.settings = shown.model->get();
-    shown.revision = revision;
+    if (!shown.read_settings()) continue;
     if (before != shown.settings.surfaces && shown.source &&
         (!shown.settings.surfaces || shown.source->scene.get() != &shown.settings.surfaces->scene())) {
       shown.source = nullptr;

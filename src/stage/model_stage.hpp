@@ -13,6 +13,7 @@
 #include "jobs/surface_builder.hpp"
 #include "scene/snapshot.hpp"
 #include "stage/settings.hpp"
+#include "stage/shared_item.hpp"
 #include "stage/stage_host.hpp"
 #include "surface/scene.hpp"
 
@@ -53,13 +54,9 @@ class ModelStage {
   [[nodiscard]] std::optional<std::uint64_t> tag_of(std::uint64_t id) const;
 
  private:
-  // A displayed model, with its settings when it was last checked.
-  struct Shown {
-    std::shared_ptr<ModelInstance> model;
-    std::uint64_t id = 0;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;
-    ModelSettings settings;
+  // A displayed model.
+  struct Shown : SharedItem<ModelSettings> {
+    using SharedItem::SharedItem;
     std::optional<PoseCache::Request> request;
     std::optional<PoseCache::Request> begun;  // the last request before `request` that was being posed
     scene::ModelSourcePtr source;             // the newest; null: none yet

@@ -33,10 +33,7 @@ void join(BuildSettings& a, const BuildSettings& b) {
 
 void VolumeStage::follow_instances() {
   for (Shown& shown : shown_) {
-    const std::uint64_t revision = shown.instance->revision();
-    if (revision == shown.revision) continue;
-    shown.settings = shown.instance->get();
-    shown.revision = revision;
+    if (!shown.read_settings()) continue;
     shown.medium.set(shown_medium(shown.settings.medium));
     const bool has_other_source = shown.feed && shown.feed->source() != shown.source();
     if (has_other_source || !shown.has_anything()) shown.forget();

@@ -294,11 +294,7 @@ void VolumeStage::add_instance(std::shared_ptr<Instance> instance, std::uint64_t
   host_.sync();
   if (find(*instance) != shown_.end())
     throw Error(ErrorCode::invalid_argument, "the instance is already in the viewer");
-  Shown shown;
-  shown.id = id;
-  shown.listener = instance->listen([host = &host_] { host->notify(); });
-  shown.instance = std::move(instance);
-  shown_.push_back(std::move(shown));
+  shown_.emplace_back(std::move(instance), id, host_);
   host_.touch();
 }
 
@@ -311,7 +307,7 @@ void VolumeStage::remove_instance(const Instance& instance) {
 }
 
 std::vector<VolumeStage::Shown>::iterator VolumeStage::find(const Instance& instance) {
-  return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.instance.get() == &instance; });
+  return std::ranges::find_if(shown_, [&](const Shown& shown) { return shown.object.get() == &instance; });
 }
 
 bool VolumeStage::makes_room(const Shown& shown) const {

@@ -22,6 +22,7 @@
 #include "stage/gl_budget.hpp"
 #include "stage/sequence_feed.hpp"
 #include "stage/settings.hpp"
+#include "stage/shared_item.hpp"
 #include "stage/stage_host.hpp"
 
 namespace cumulet::viewer {
@@ -145,13 +146,9 @@ class VolumeStage {
   [[nodiscard]] bool something_waits() const;
 
  private:
-  // A displayed instance, with its settings when it was last checked.
-  struct Shown {
-    std::shared_ptr<Instance> instance;
-    std::uint64_t id = 0;
-    std::shared_ptr<void> listener;
-    std::uint64_t revision = 0;
-    InstanceSettings settings;
+  // A displayed instance.
+  struct Shown : SharedItem<InstanceSettings> {
+    using SharedItem::SharedItem;
     scene::Part<scene::Medium> medium;
     std::optional<GridCache::Request> request;
     std::optional<GridCache::Request> begun;  // the last request before `request` that was being built

@@ -16,12 +16,20 @@ constexpr double longest_step = 2.0;  // voxels
 /// Returns empty fields of the same kinds.
 VolumeFrame like(const VolumeFrame& frame) {
   VolumeFrame out;
-  if (frame.temperature) out.temperature.emplace();
-  if (frame.flame) out.flame.emplace();
-  if (frame.color) out.color.emplace();
-  if (frame.anisotropy) out.anisotropy.emplace();
+  const auto emplace = [](const auto& field, auto& to) {
+    if (field) to.emplace();
+  };
+  for_each_amount(emplace, frame, out);
+  for_each_property(emplace, frame, out);
   if (frame.velocity) out.velocity = Velocity{{}, frame.velocity->to_index};
   return out;
+}
+
+/// Returns the number of fields that are amounts per unit volume, density first.
+std::size_t amounts_of(const VolumeFrame& frame) {
+  std::size_t count = 1;
+  for_each_amount([&](const auto& field) { count += field ? 1U : 0U; }, frame);
+  return count;
 }
 
 /// Returns the frame's fields, followed by the parts of the velocity that advects them.
@@ -36,7 +44,7 @@ class Advection final : Gathering {
   Advection(const VolumeFrame& frame, double seconds, Progress* progress, Portion portion)
       : Gathering(sources_of(frame), frame.fields().size(), progress, portion),
         fields_(frame.fields().size()),
-        of_matter_(1 + (frame.temperature ? 1U : 0U) + (frame.flame ? 1U : 0U)),
+        of_matter_(amounts_of(frame)),
         moves_(seconds * frame.velocity->to_index) {
     for (const ScalarVolume& part : frame.velocity->parts) {
       if (!part.empty()) carried_.expand({part.bounds_min, part.bounds_max});

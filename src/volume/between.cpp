@@ -165,11 +165,9 @@ VolumeFrame blend(const VolumeFrame& before, const VolumeFrame& after, double pa
     VolumeFrame out;
     Pairs pairs;
     pairs.add(&before.density, &after.density, out.density);
-    pairs.add_matter(before.temperature, after.temperature, out.temperature);
-    pairs.add_matter(before.flame, after.flame, out.flame);
+    for_each_amount([&](const auto& a, const auto& b, auto& to) { pairs.add_matter(a, b, to); }, before, after, out);
     const std::size_t of_matter = pairs.out.size();
-    pairs.add_kind(before.color, after.color, out.color);
-    pairs.add_kind(before.anisotropy, after.anisotropy, out.anisotropy);
+    for_each_property([&](const auto& a, const auto& b, auto& to) { pairs.add_kind(a, b, to); }, before, after, out);
     if (before.velocity || after.velocity) {
       const Velocity& first = before.velocity ? *before.velocity : *after.velocity;
       // If the velocities use different axes, the first one is used for both.

@@ -1,7 +1,6 @@
 #include "volume/frame.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <limits>
 
 namespace cumulet::volume {
@@ -11,12 +10,16 @@ namespace {
 template <class Field, class Frame>
 std::vector<Field*> fields_beside_density(Frame& frame) {
   std::vector<Field*> fields;
-  if (frame.temperature) fields.push_back(&*frame.temperature);
-  if (frame.flame) fields.push_back(&*frame.flame);
-  const auto pointer = [](Field& part) { return &part; };
-  if (frame.color) std::ranges::transform(*frame.color, std::back_inserter(fields), pointer);
-  if (frame.anisotropy) std::ranges::transform(*frame.anisotropy, std::back_inserter(fields), pointer);
-  if (frame.velocity) std::ranges::transform(frame.velocity->parts, std::back_inserter(fields), pointer);
+  const auto add = [&](Field& field) { fields.push_back(&field); };
+  const auto add_amount = [&](auto& field) {
+    if (field) add(*field);
+  };
+  const auto add_property = [&](auto& parts) {
+    if (parts) std::ranges::for_each(*parts, add);
+  };
+  for_each_amount(add_amount, frame);
+  for_each_property(add_property, frame);
+  if (frame.velocity) std::ranges::for_each(frame.velocity->parts, add);
   return fields;
 }
 

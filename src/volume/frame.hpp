@@ -53,4 +53,19 @@ struct VolumeFrame {
   [[nodiscard]] std::vector<ScalarVolume*> fields();
 };
 
+/// Calls visit with each optional field that is an amount per unit volume, like density. frames: one frame, or several
+/// whose fields are passed together. The order is that of VolumeFrame::fields().
+template <class Visit, class... Frame>
+void for_each_amount(const Visit& visit, Frame&... frames) {
+  visit(frames.temperature...);
+  visit(frames.flame...);
+}
+/// Calls visit with each optional field that is a property of matter, averaged with the density as weight. Velocity has
+/// axes and is left out.
+template <class Visit, class... Frame>
+void for_each_property(const Visit& visit, Frame&... frames) {
+  visit(frames.color...);
+  visit(frames.anisotropy...);
+}
+
 }  // namespace cumulet::volume

@@ -343,7 +343,7 @@ TEST_F(Contract, Contract20cPhysicalSkiesAreComputedOnAWorker) {
   EXPECT_EQ(std::ranges::count(trace.threads, std::this_thread::get_id()), 0);
 }
 
-// Context loss at each call: ContextLossAt in robustness_test.cpp.
+// Context loss at each call: ContextLossAt in context_loss_test.cpp.
 TEST_F(Contract, Contract21ContextIsReplaced) {
   const Picture picture = picture_of(v_, volume_.get(), target_);
   for (const bool lost : {false, true}) {

@@ -1,5 +1,6 @@
 // The embedding contract of docs/architecture.md, one test per point, using only cumulet.h and cumulet.hpp. Points that
-// need more than one test (all state, all allocations, threads, windows) are in robustness_test.cpp and tests/embed.
+// need more than one test (all state, all allocations, threads, windows) are in robustness_test.cpp,
+// out_of_memory_test.cpp and tests/embed.
 #include <gtest/gtest.h>
 
 #include <sys/wait.h>

@@ -85,9 +85,9 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 
 void expect_same_grid(const grid::TetGrid& a, const grid::TetGrid& b) {
   EXPECT_TRUE(same_bits(a.cells, b.cells)) << a.cells.size() << " and " << b.cells.size();
-  EXPECT_TRUE(same_bits(a.color, b.color));
-  EXPECT_TRUE(same_bits(a.anisotropy, b.anisotropy));
-  EXPECT_TRUE(same_bits(a.velocity, b.velocity));
+  EXPECT_TRUE(same_bits(a.channels.color, b.channels.color));
+  EXPECT_TRUE(same_bits(a.channels.anisotropy, b.channels.anisotropy));
+  EXPECT_TRUE(same_bits(a.channels.velocity, b.channels.velocity));
 }
 
 // A factor that is a power of two changes no mantissa, so it changes no cell.

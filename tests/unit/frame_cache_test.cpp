@@ -87,7 +87,7 @@ void expect_same_grid(const cumulet::viewer::Built& a, const cumulet::viewer::Bu
   };
   EXPECT_EQ(bytes(a.source->grid->cells), bytes(b.source->grid->cells));
   EXPECT_EQ(bytes(a.source->grid->tree), bytes(b.source->grid->tree));
-  EXPECT_EQ(bytes(a.source->grid->emission), bytes(b.source->grid->emission));
+  EXPECT_EQ(bytes(a.source->grid->channels.emission), bytes(b.source->grid->channels.emission));
   EXPECT_EQ(a.source->max_value, b.source->max_value);
 }
 

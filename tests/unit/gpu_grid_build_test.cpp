@@ -384,14 +384,16 @@ TEST_P(GpuGridBuilds, ChannelsMatchTheVoxels) {
       const glm::uvec4& words = read.cells[c].data;
       // The CPU's sums, relative to a brick's mean, lose small values beside the brightest, which is 200.
       for (int k = 0; k < 3; ++k)
-        ASSERT_NEAR(emission[c].mean[k], expected.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F) << c;
+        ASSERT_NEAR(emission[c].mean[k], expected.channels.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F)
+            << c;
       if (emission[c].mean.x > 1.0F) {
         ++glowing;
-        if (emission[c].gradient != expected.emission[c].gradient || color[c] != expected.color[c] ||
-            velocity[c] != expected.velocity[c] || anisotropy[c] != expected.anisotropy[c])
+        if (emission[c].gradient != expected.channels.emission[c].gradient || color[c] != expected.channels.color[c] ||
+            velocity[c] != expected.channels.velocity[c] || anisotropy[c] != expected.channels.anisotropy[c])
           ++others;
         const glm::uvec4 light(glm::floatBitsToUint(emission[c].mean), emission[c].gradient);
-        const glm::uvec4 wanted(glm::floatBitsToUint(expected.emission[c].mean), expected.emission[c].gradient);
+        const glm::uvec4 wanted(glm::floatBitsToUint(expected.channels.emission[c].mean),
+                                expected.channels.emission[c].gradient);
         ASSERT_LT(glm::length(core::cm_emission_gradient(light) - core::cm_emission_gradient(wanted)), 0.015F) << c;
       }
       // Cells larger than a brick are averaged on the CPU.
@@ -427,9 +429,10 @@ TEST_P(GpuGridBuilds, FireWithoutDensityEmits) {
   Rounding rounding;
   expect_same(expected, built, read(built), rounding);
   EXPECT_GT(built.count, 1000U);
-  EXPECT_EQ(built.emissive.cells.size(),
-            expected.cells.size() - static_cast<std::size_t>(std::ranges::count_if(
-                                        expected.emission, [](const auto& e) { return e.mean == glm::vec3(0.0F); })));
+  EXPECT_EQ(built.emissive.cells.size(), expected.cells.size() - static_cast<std::size_t>(std::ranges::count_if(
+                                                                     expected.channels.emission, [](const auto& e) {
+                                                                       return e.mean == glm::vec3(0.0F);
+                                                                     })));
   EXPECT_FALSE(built.channels[static_cast<std::size_t>(grid::Channel::color)]);
 }
 
@@ -664,49 +667,6 @@ TEST_P(GpuGridBuilds, ErrorsNameTheExceededLimit) {
     EXPECT_NE(std::string(error.what()).find("GL_MAX_SHADER_STORAGE_BLOCK_SIZE is 4096"), std::string::npos)
         << error.what();
   }
-}
-
-// A host with 60 frames per second and GPU work of its own. It notices the end of a batch only at the next frame.
-TEST(GpuGridBuildPace, BusyHostDoesNotStarveTheBuild) {
-  using render::GridPace;
-  const gl::ProgramKey key{"grid_cells.comp", {"CM_STAGE 1"}};
-  for (const double guess : {1.0, 0.2, 5.0}) {  // relative to the true cost
-    for (const double other_ms : {0.0, 17.0}) {
-      SCOPED_TRACE(testing::Message() << guess << " " << other_ms);
-      GridPace pace;
-      constexpr double truth = 7.5e-6;
-      constexpr double all = 2e7;
-      double done = 0.0;
-      int frames = 0;
-      double longest = 0.0;
-      while (done < all && frames < 10000) {
-        ++frames;
-        std::vector<GridPace::Sent> sent;
-        double thought = 0.0;
-        double took = 0.0;
-        while (thought < 8.0 && done < all) {
-          const double ms = pace.ms(key, guess * truth);
-          const double items = std::clamp(1.0 / ms, 64.0, 65535.0 * 64.0);
-          sent.push_back({key, guess * truth, items});
-          thought += ms * items;
-          took += truth * items;
-          longest = std::max(longest, truth * items);
-          done += items;
-        }
-        const double seen = 16.7 * std::ceil((took + other_ms) / 16.7);
-        pace.learn(sent, seen, GridPace::Measured::at_most);
-      }
-      EXPECT_LT(frames, 700);
-      EXPECT_LT(longest, 6.0);
-    }
-  }
-  // With exact measurements, the estimate converges to the true cost and stays there.
-  GridPace pace;
-  for (int i = 0; i < 40; ++i) {
-    const GridPace::Sent sent{key, 1e-6, 1e5};
-    pace.learn({sent, sent, sent}, 3.0 * 1e5 * 2e-5, GridPace::Measured::exactly);
-  }
-  EXPECT_NEAR(pace.ms(key, 1e-6), 2e-5, 1e-7);
 }
 
 }  // namespace

@@ -346,10 +346,10 @@ void expect_near(const grid::RgbField::Components& found, const grid::RgbField::
 }
 
 void expect_same_light(const Cells& found, const grid::TetGrid& expected) {
-  ASSERT_EQ(found.emission.size(), expected.emission.size());
-  for (std::size_t i = 0; i < expected.emission.size(); ++i) {
+  ASSERT_EQ(found.emission.size(), expected.channels.emission.size());
+  for (std::size_t i = 0; i < expected.channels.emission.size(); ++i) {
     const glm::vec3 a = found.emission[i].mean;
-    const glm::vec3 b = expected.emission[i].mean;
+    const glm::vec3 b = expected.channels.emission[i].mean;
     ASSERT_LE(glm::length(a - b), 1e-4F * glm::length(b) + 1e-6F) << i;
   }
 }
@@ -448,21 +448,22 @@ glm::vec3 velocity_of(const glm::uvec2& packed) {
 }
 
 void expect_same_channels(const Cells& found, const grid::TetGrid& expected, float fastest) {
-  ASSERT_EQ(found.color.size(), expected.color.size());
-  ASSERT_EQ(found.anisotropy.size(), expected.anisotropy.size());
-  ASSERT_EQ(found.velocity.size(), expected.velocity.size());
-  for (std::size_t i = 0; i < expected.color.size(); ++i) {
-    const glm::ivec3 apart = glm::abs(color_of(found.color[i]) - color_of(expected.color[i]));
+  ASSERT_EQ(found.color.size(), expected.channels.color.size());
+  ASSERT_EQ(found.anisotropy.size(), expected.channels.anisotropy.size());
+  ASSERT_EQ(found.velocity.size(), expected.channels.velocity.size());
+  for (std::size_t i = 0; i < expected.channels.color.size(); ++i) {
+    const glm::ivec3 apart = glm::abs(color_of(found.color[i]) - color_of(expected.channels.color[i]));
     ASSERT_LE(std::max({apart.x, apart.y, apart.z}), 1) << i;
   }
-  for (std::size_t i = 0; i < expected.anisotropy.size(); ++i) {
+  for (std::size_t i = 0; i < expected.channels.anisotropy.size(); ++i) {
     // For very low scattering the tolerance is larger, because sums over bricks are floats.
     float scatters = glm::unpackHalf2x16(expected.cells[i].data.z).x;
-    if (!expected.color.empty()) scatters *= static_cast<float>(color_of(expected.color[i]).y) / 2047.0F;
-    ASSERT_NEAR(found.anisotropy[i], expected.anisotropy[i], scatters > 0.01F ? 4 : 1000) << i;
+    if (!expected.channels.color.empty())
+      scatters *= static_cast<float>(color_of(expected.channels.color[i]).y) / 2047.0F;
+    ASSERT_NEAR(found.anisotropy[i], expected.channels.anisotropy[i], scatters > 0.01F ? 4 : 1000) << i;
   }
-  for (std::size_t i = 0; i < expected.velocity.size(); ++i) {
-    const glm::vec3 apart = glm::abs(velocity_of(found.velocity[i]) - velocity_of(expected.velocity[i]));
+  for (std::size_t i = 0; i < expected.channels.velocity.size(); ++i) {
+    const glm::vec3 apart = glm::abs(velocity_of(found.velocity[i]) - velocity_of(expected.channels.velocity[i]));
     ASSERT_LE(std::max({apart.x, apart.y, apart.z}), 1e-3F * fastest) << i;
   }
 }

@@ -59,10 +59,10 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
   Random random(seed);
   auto grid = std::make_shared<grid::TetGrid>();
   grid->cells = random.records<grid::CellRecord>(sizes.cells);
-  grid->emission = random.records<grid::EmissionRecord>(sizes.emission);
-  grid->color = random.records<std::uint32_t>(sizes.color);
-  grid->anisotropy = random.records<std::int16_t>(sizes.anisotropy);
-  grid->velocity = random.records<glm::uvec2>(sizes.velocity);
+  grid->channels.emission = random.records<grid::EmissionRecord>(sizes.emission);
+  grid->channels.color = random.records<std::uint32_t>(sizes.color);
+  grid->channels.anisotropy = random.records<std::int16_t>(sizes.anisotropy);
+  grid->channels.velocity = random.records<glm::uvec2>(sizes.velocity);
   grid->tree = random.records<std::uint32_t>(sizes.tree);
   for (grid::RootEntry& root : grid->roots) root = {random(), random()};
   grid->levels = seed;
@@ -86,11 +86,12 @@ std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
     to.resize(count);
     if (count > 0) std::memcpy(to.data(), from, count * sizeof to.front());
   };
-  copy_words(words[1], grid.emission.data(), grid.emission.size());
+  copy_words(words[1], grid.channels.emission.data(), grid.channels.emission.size());
   copy_words(words[2], source->emissive.cells.data(), source->emissive.cells.size() * 2);
-  for (const std::uint32_t word : grid.color) words[3].emplace_back(word, 0, 0, 0);
-  for (const std::int16_t half : grid.anisotropy) words[4].emplace_back(static_cast<std::uint16_t>(half), 0, 0, 0);
-  for (const glm::uvec2& halves : grid.velocity) words[5].emplace_back(halves, 0, 0);
+  for (const std::uint32_t word : grid.channels.color) words[3].emplace_back(word, 0, 0, 0);
+  for (const std::int16_t half : grid.channels.anisotropy)
+    words[4].emplace_back(static_cast<std::uint16_t>(half), 0, 0, 0);
+  for (const glm::uvec2& halves : grid.channels.velocity) words[5].emplace_back(halves, 0, 0);
   for (const std::uint32_t word : grid.tree) words[6].emplace_back(word, 0, 0, 0);
   for (const grid::RootEntry& root : grid.roots) words[7].emplace_back(root.first_leaf, root.first_internal, 0, 0);
   return words;
@@ -162,7 +163,7 @@ class GridSetUploads : public test::GlTest {
       EXPECT_EQ(grid->box_min, sources[s]->grid->content_min);
       EXPECT_EQ(grid->box_max, sources[s]->grid->content_max);
       EXPECT_EQ(grid->glowing, sources[s]->emissive.cells.size());
-      EXPECT_EQ(grid->moves, sources[s]->grid->velocity.empty() ? 0U : 1U);
+      EXPECT_EQ(grid->moves, sources[s]->grid->channels.velocity.empty() ? 0U : 1U);
       const auto expected = expected_of(sources[s]);
       for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
         if (expected[kind].empty()) continue;

@@ -12,9 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "support/c_playback.hpp"
-#include "support/live_volumes.hpp"
-#include "support/simulated.hpp"
+#include "support/c_live_volume.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
 
@@ -22,9 +20,12 @@ namespace {
 
 using cumulet::test::alone;
 using cumulet::test::at;
-using cumulet::test::CameraRef;
+using cumulet::test::CLiveVolume;
 using cumulet::test::difference;
 using cumulet::test::expect_same_fields;
+using cumulet::test::fire;
+using cumulet::test::hand_over;
+using cumulet::test::HandOver;
 using cumulet::test::InstanceRef;
 using cumulet::test::LiveRef;
 using cumulet::test::make_ball;
@@ -33,70 +34,15 @@ using cumulet::test::make_live;
 using cumulet::test::newest;
 using cumulet::test::odd;
 using cumulet::test::picture_of;
+using cumulet::test::refusal;
 using cumulet::test::Sides;
 using cumulet::test::simulated;
 using cumulet::test::small;
+using cumulet::test::smoke;
 using cumulet::test::State;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
 using Picture = std::vector<std::uint8_t>;
-
-using HandOver = cumulet_status (*)(cumulet_dynamic_volume*, const cumulet_volume_fields_desc*, char*, std::size_t);
-
-void hand_over(const LiveRef& live, const State& state, HandOver how = cumulet_dynamic_volume_set) {
-  std::array<char, 256> error{};
-  const cumulet_volume_fields_desc desc = state.desc();
-  ASSERT_EQ(how(live.get(), &desc, error.data(), error.size()), CUMULET_OK) << error.data();
-}
-
-std::string refusal(const LiveRef& live, const cumulet_volume_fields_desc& desc, cumulet_status status,
-                    HandOver how = cumulet_dynamic_volume_set) {
-  std::array<char, 256> error{};
-  EXPECT_EQ(how(live.get(), &desc, error.data(), error.size()), status);
-  return error.data();
-}
-
-State fire(const Sides& size, int step) {
-  State state;
-  for (const auto channel :
-       {CUMULET_CHANNEL_DENSITY, CUMULET_CHANNEL_TEMPERATURE, CUMULET_CHANNEL_FLAME, CUMULET_CHANNEL_RED,
-        CUMULET_CHANNEL_GREEN, CUMULET_CHANNEL_BLUE, CUMULET_CHANNEL_ANISOTROPY, CUMULET_CHANNEL_VELOCITY_X,
-        CUMULET_CHANNEL_VELOCITY_Y, CUMULET_CHANNEL_VELOCITY_Z})
-    state.dense(channel, size, step);
-  return state;
-}
-
-State smoke(const Sides& size, int step) { return std::move(State().dense(CUMULET_CHANNEL_DENSITY, size, step)); }
-
-class CLiveVolume : public cumulet::test::CPlaybackTest {
- protected:
-  // The image of a new viewer that shows only this state.
-  Picture picture_alone(const State& state) {
-    const ViewerPtr viewer = make();
-    return picture_of(viewer.get(), alone(state).get(), target_);
-  }
-  static cumulet_dynamic_volume_info info_of(const ViewerPtr& viewer) {
-    auto info = make_desc<cumulet_dynamic_volume_info>();
-    EXPECT_EQ(cumulet_get_dynamic_volume_info(viewer.get(), &info), CUMULET_OK) << cumulet_last_error(viewer.get());
-    return info;
-  }
-  // Renders until this state is displayed. Returns the displayed states in order.
-  std::vector<std::uint64_t> show(const ViewerPtr& viewer, std::uint64_t state) {
-    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    const auto frame = target_.frame();
-    std::vector<std::uint64_t> seen;
-    while (info_of(viewer).displayed_update != state) {
-      EXPECT_EQ(cumulet_render(viewer.get(), &frame, nullptr), CUMULET_OK) << cumulet_last_error(viewer.get());
-      const std::uint64_t drawn = info_of(viewer).displayed_update;
-      if (seen.empty() || seen.back() != drawn) seen.push_back(drawn);
-      if (std::chrono::steady_clock::now() > until) {
-        ADD_FAILURE() << "state " << state << " is never seen";
-        break;
-      }
-    }
-    return seen;
-  }
-};
 
 TEST_F(CLiveVolume, InvalidInputGivesAOneLineError) {
   auto desc = make_desc<cumulet_dynamic_volume_desc>();
@@ -330,99 +276,6 @@ TEST_F(CLiveVolume, RejectedStateKeepsTheLastValidState) {
             "smoke: there is no state to update");
   hand_over(live, smoke(small, 1));
   EXPECT_EQ(difference(picture(viewer.get()), picture_alone(smoke(small, 1))), "");
-}
-
-struct Releases {
-  std::atomic<int> count = 0;
-  static void add(void* user) {
-    // Calls from inside the callback are rejected.
-    EXPECT_EQ(cumulet_dynamic_volume_set(nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
-    ++static_cast<Releases*>(user)->count;
-  }
-};
-
-TEST_F(CLiveVolume, HostMemoryIsReleasedOnce) {
-  const LiveRef live = make_live();
-  Releases releases;
-  const auto held = [&](const State& state) {
-    auto desc = state.desc();
-    desc.release = Releases::add;
-    desc.release_user = &releases;
-    return desc;
-  };
-  std::array<char, 256> error{};
-  const State first = fire(odd, 0);
-  const State second = fire(odd, 1);
-  const cumulet_volume_fields_desc one = held(first);
-  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &one, error.data(), error.size()), CUMULET_OK) << error.data();
-  EXPECT_EQ(releases.count, 0);
-  const cumulet_volume_fields_desc two = held(second);
-  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &two, error.data(), error.size()), CUMULET_OK) << error.data();
-  EXPECT_EQ(releases.count, 1);  // the first state was not read yet
-  expect_same_fields(newest(live), alone(second));
-  EXPECT_EQ(releases.count, 2);
-  // Rejected in the call: the host keeps the memory.
-  const State nothing;
-  EXPECT_EQ(refusal(live, held(nothing), CUMULET_ERROR_INVALID_ARGUMENT),
-            "smoke: has no density, temperature or flame");
-  EXPECT_EQ(releases.count, 2);
-  // Rejected when it is read: the last good state stays, and the memory is released.
-  auto values = simulated(CUMULET_CHANNEL_DENSITY, odd, 2);
-  values[State::at({22, 30, 16}, odd)] = std::numeric_limits<float>::quiet_NaN();
-  State bad;
-  bad.dense(CUMULET_CHANNEL_DENSITY, odd, values);
-  const cumulet_volume_fields_desc three = held(bad);
-  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &three, error.data(), error.size()), CUMULET_OK);
-  cumulet_volume* out = nullptr;
-  EXPECT_EQ(cumulet_dynamic_volume_get_volume(live.get(), &out, error.data(), error.size()), CUMULET_ERROR_FILE);
-  EXPECT_STREQ(error.data(), "smoke: density: its voxel (22, 30, 16) is not finite");
-  EXPECT_EQ(releases.count, 3);
-  expect_same_fields(newest(live), alone(second));
-  // The library keeps no voxels of it.
-  ASSERT_EQ(cumulet_dynamic_volume_set(live.get(), &two, error.data(), error.size()), CUMULET_OK);
-  State bricks;
-  bricks.sparse(CUMULET_CHANNEL_DENSITY, odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 3), {{8, 8, 8}});
-  EXPECT_EQ(refusal(live, bricks.desc(), CUMULET_ERROR_INVALID_ARGUMENT, cumulet_dynamic_volume_update),
-            "smoke: density does not accept bricks: it was set with tiles or with a release function");
-  EXPECT_EQ(releases.count, 3);
-  cumulet_dynamic_volume_release(cumulet_dynamic_volume_retain(live.get()));
-  EXPECT_EQ(releases.count, 3);
-}
-
-TEST_F(CLiveVolume, HostMemoryIsReleasedWithTheHandle) {
-  Releases releases;
-  const State state = smoke(small, 0);
-  auto desc = state.desc();
-  desc.release = Releases::add;
-  desc.release_user = &releases;
-  ASSERT_EQ(cumulet_dynamic_volume_set(make_live().get(), &desc, nullptr, 0), CUMULET_OK);
-  EXPECT_EQ(releases.count, 1);
-}
-
-// The release callback is called without a lock of the library. The host holds a lock of its own in it, and while it
-// asks for the newest state.
-TEST_F(CLiveVolume, HostMemoryIsReleasedWithoutALock) {
-  static std::recursive_mutex pool;
-  const LiveRef live = make_live();
-  const State state = smoke(small, 0);
-  auto desc = state.desc();
-  desc.release = [](void*) { const std::scoped_lock lock(pool); };
-  std::atomic<bool> stop = false;
-  const auto reads = [&](bool locks) {
-    while (!stop) {
-      std::unique_lock lock(pool, std::defer_lock);
-      if (locks) lock.lock();
-      cumulet_volume* out = nullptr;
-      EXPECT_EQ(cumulet_dynamic_volume_get_volume(live.get(), &out, nullptr, 0), CUMULET_OK);
-      cumulet_volume_release(out);
-    }
-  };
-  std::thread first(reads, true);
-  std::thread second(reads, false);
-  for (int i = 0; i < 50; ++i) EXPECT_EQ(cumulet_dynamic_volume_set(live.get(), &desc, nullptr, 0), CUMULET_OK);
-  stop = true;
-  first.join();
-  second.join();
 }
 
 TEST_F(CLiveVolume, ViewersMayBeDestroyedDuringUpdates) {

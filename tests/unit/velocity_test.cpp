@@ -67,7 +67,7 @@ TEST(Velocity, CellVelocityIsTheDensityWeightedMean) {
                     })};
   const grid::Cube cube = grid::fit_cube(frame.density);
   EXPECT_FALSE(scene::momentum_of(frame));
-  EXPECT_TRUE(cells_of(frame, cube).velocity.empty());
+  EXPECT_TRUE(cells_of(frame, cube).channels.velocity.empty());
   const auto of = [](const ivec3& p) {
     return vec3(p.x < 5 ? -900.0F : 3.0F, static_cast<float>(p.y - p.z), p.z < 9 ? 20.0F : 0.0F);
   };
@@ -76,7 +76,7 @@ TEST(Velocity, CellVelocityIsTheDensityWeightedMean) {
   const volume::Ramp ramp({{0.0F, 0.0F}, {0.5F, 0.1F}, {1.0F, 1.0F}});
   for (const bool ramped : {false, true}) {
     const grid::TetGrid made = cells_of(frame, cube, ramped ? ramp : volume::Ramp());
-    ASSERT_EQ(made.velocity.size(), made.cells.size());
+    ASSERT_EQ(made.channels.velocity.size(), made.cells.size());
     EXPECT_GT(made.cells.size(), 100U);
     std::vector<double> mass(made.cells.size());
     std::vector<dvec3> momentum(made.cells.size());
@@ -89,7 +89,7 @@ TEST(Velocity, CellVelocityIsTheDensityWeightedMean) {
     });
     for (std::size_t cell = 0; cell < made.cells.size(); ++cell) {
       const dvec3 mean = mass[cell] > 0.0 ? momentum[cell] / mass[cell] : dvec3(0.0);
-      const dvec3 stored(core::cm_cell_velocity(made.velocity[cell]));
+      const dvec3 stored(core::cm_cell_velocity(made.channels.velocity[cell]));
       // Precision of half floats, and the float error of the largest value, 1800.
       for (int i = 0; i < 3; ++i)
         ASSERT_NEAR(stored[i], mean[i], 5e-4 * std::abs(mean[i]) + 5e-4) << cell << " axis " << i;
@@ -106,7 +106,7 @@ TEST(Velocity, ZeroAndTooLargeVelocitiesAreHandled) {
   frame.velocity->to_index = dmat3(3.0);
   const grid::TetGrid made = cells_of(frame, grid::fit_cube(frame.density));
   int moving = 0;
-  for (const glm::uvec2& stored : made.velocity) {
+  for (const glm::uvec2& stored : made.channels.velocity) {
     const vec3 v = core::cm_cell_velocity(stored);
     if (v.x == 0.0F) continue;
     ++moving;

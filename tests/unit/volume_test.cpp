@@ -6,8 +6,6 @@
 
 #include "volume/volume.hpp"
 #include "volume/inspection.hpp"
-#include "volume/memory.hpp"
-#include "volume/optical_depth.hpp"
 
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>
@@ -20,189 +18,28 @@
 #include <cmath>
 #include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
-#include <map>
 #include <random>
-#include <set>
 
 #include "base/error.hpp"
-#include "support/folder.hpp"
-#include "support/vdb_files.hpp"
-
-#if defined(__SANITIZE_ADDRESS__)
-#include <sanitizer/lsan_interface.h>
-#endif
+#include "support/volume_import.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
+using cumulet::test::expect_contract;
+using cumulet::test::expect_same;
 using cumulet::test::fog;
+using cumulet::test::Lookup;
 using cumulet::test::Messages;
+using cumulet::test::reference;
+using cumulet::test::rich;
+using cumulet::test::VolumeImport;
 using cumulet::volume::import_volume;
 using cumulet::volume::list_grids;
 using cumulet::volume::ScalarVolume;
-using cumulet::volume::Tile;
 using openvdb::Coord;
 using openvdb::CoordBBox;
 using openvdb::FloatGrid;
-
-/// Point queries on a volume, as volume.hpp defines them.
-class Lookup {
- public:
-  explicit Lookup(const ScalarVolume& volume) : volume_(volume) {
-    for (std::size_t i = 0; i < volume.brick_origins.size(); ++i) bricks_[key(volume.brick_origins[i])] = i;
-  }
-  [[nodiscard]] bool inside(glm::ivec3 p) const {
-    return glm::all(glm::greaterThanEqual(p, volume_.bounds_min)) &&
-           glm::all(glm::lessThanEqual(p, volume_.bounds_max));
-  }
-  [[nodiscard]] float value(glm::ivec3 p) const {
-    if (!inside(p)) return 0.0F;
-    if (const auto it = bricks_.find(key(p & ~7)); it != bricks_.end()) {
-      const auto i = static_cast<std::size_t>(((p.x & 7) * 8 + (p.y & 7)) * 8 + (p.z & 7));
-      return volume_.brick_values[it->second * 512 + i];
-    }
-    for (const Tile& t : volume_.tiles) {
-      if (glm::all(glm::greaterThanEqual(p, t.min)) && glm::all(glm::lessThanEqual(p, t.max))) return t.value;
-    }
-    return volume_.background;
-  }
-
- private:
-  using Key = std::array<int, 3>;
-  static Key key(glm::ivec3 p) { return {p.x, p.y, p.z}; }
-  const ScalarVolume& volume_;
-  std::map<Key, std::size_t> bricks_;
-};
-
-void expect_contract(const ScalarVolume& v) {
-  ASSERT_EQ(v.brick_values.size(), v.brick_origins.size() * 512);
-  const auto tuple = [](glm::ivec3 p) { return std::make_tuple(p.x, p.y, p.z); };
-  const auto overlap = [](const Tile& a, const Tile& b) {
-    return glm::all(glm::lessThanEqual(glm::max(a.min, b.min), glm::min(a.max, b.max)));
-  };
-  const Tile bounds{v.bounds_min, v.bounds_max, 0.0F};
-  for (std::size_t i = 0; i < v.brick_origins.size(); ++i) {
-    const glm::ivec3 o = v.brick_origins[i];
-    EXPECT_EQ(o & 7, glm::ivec3(0));
-    if (i > 0) {
-      EXPECT_LT(tuple(v.brick_origins[i - 1]), tuple(o));
-    }
-    const Tile box{o, o + 7, 0.0F};
-    EXPECT_TRUE(overlap(box, bounds));
-    std::set<float> values;
-    for (int n = 0; n < 512; ++n) {
-      const glm::ivec3 p = o + glm::ivec3(n >> 6, (n >> 3) & 7, n & 7);
-      const float value = v.brick_values[i * 512 + static_cast<std::size_t>(n)];
-      EXPECT_TRUE(std::isfinite(value) && value >= 0.0F && !std::signbit(value));
-      if (overlap({p, p, 0.0F}, bounds)) {
-        values.insert(value);
-      } else {
-        EXPECT_EQ(value, 0.0F);
-      }
-    }
-    EXPECT_GT(values.size(), 1U) << "a constant brick is a tile or background";
-  }
-  for (std::size_t i = 0; i < v.tiles.size(); ++i) {
-    const Tile& t = v.tiles[i];
-    EXPECT_TRUE(glm::all(glm::lessThanEqual(t.min, t.max)));
-    EXPECT_TRUE(glm::all(glm::greaterThanEqual(t.min, v.bounds_min)) &&
-                glm::all(glm::lessThanEqual(t.max, v.bounds_max)));
-    EXPECT_NE(t.value, v.background);
-    if (v.tiles.size() + v.brick_origins.size() > 3000) continue;
-    for (std::size_t j = 0; j < i; ++j) EXPECT_FALSE(overlap(t, v.tiles[j]));
-    for (const glm::ivec3 o : v.brick_origins) EXPECT_FALSE(overlap(t, {o, o + 7, 0.0F}));
-  }
-}
-
-/// Checks every rule of volume.hpp, and values at random voxels inside and outside the bounds.
-template <typename GridT>
-void expect_same(const GridT& grid, const ScalarVolume& v, double tolerance = 0.0) {
-  expect_contract(v);
-  const CoordBBox bounds = grid.evalActiveVoxelBoundingBox();
-  ASSERT_EQ(v.bounds_min, glm::ivec3(bounds.min().x(), bounds.min().y(), bounds.min().z()));
-  ASSERT_EQ(v.bounds_max, glm::ivec3(bounds.max().x(), bounds.max().y(), bounds.max().z()));
-  EXPECT_EQ(v.active_voxels, grid.activeVoxelCount());
-  EXPECT_EQ(v.background, std::max(0.0F, static_cast<float>(grid.background())));
-
-  const Lookup lookup(v);
-  const auto accessor = grid.getConstAccessor();
-  std::mt19937 random(7);
-  const auto compare = [&](Coord c) {
-    const float got = lookup.value({c.x(), c.y(), c.z()});
-    const float truth = bounds.isInside(c) ? std::max(0.0F, static_cast<float>(accessor.getValue(c))) : 0.0F;
-    ASSERT_NEAR(got, truth, tolerance) << c;
-    ASSERT_LE(got, v.max_value);
-  };
-  const auto pick = [&](int lo, int hi) { return std::uniform_int_distribution<int>(lo, hi)(random); };
-  for (int i = 0; i < 20000; ++i) {
-    compare({pick(bounds.min().x() - 12, bounds.max().x() + 12), pick(bounds.min().y() - 12, bounds.max().y() + 12),
-             pick(bounds.min().z() - 12, bounds.max().z() + 12)});
-  }
-  // Random positions miss small features; the neighborhood of active voxels does not.
-  int n = 0;
-  for (auto it = grid.cbeginValueOn(); it && n < 20000; ++it, ++n) {
-    compare(it.getCoord());
-    compare(it.getCoord().offsetBy(pick(-2, 2), pick(-2, 2), pick(-2, 2)));
-  }
-}
-
-class VolumeImport : public ::testing::Test {
- protected:
-  void SetUp() override { openvdb::initialize(); }
-
-  fs::path path(const std::string& name) const { return folder_ / name; }
-  fs::path write(const openvdb::GridPtrVec& grids, const std::string& name = "test.vdb") const {
-    openvdb::io::File(path(name).string()).write(grids);
-    return path(name);
-  }
-  fs::path write_bytes(const std::string& bytes, const std::string& name) const {
-    std::ofstream(path(name), std::ios::binary) << bytes;
-    return path(name);
-  }
-  static std::string bytes_of(const fs::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
-
-  static std::string refusal(const fs::path& file, const std::string& grid = {}) {
-    return cumulet::test::refusal(file, [&] { (void)import_volume(file, grid, {}); });
-  }
-
-  cumulet::test::Folder folder_;
-};
-
-FloatGrid::Ptr reference(const fs::path& file, const std::string& name) {
-  openvdb::io::File in(file.string());
-  in.open(false);
-  return openvdb::gridPtrCast<FloatGrid>(in.readGrid(name));
-}
-
-/// Bricks with active and inactive voxels, active and inactive tiles of three levels.
-FloatGrid::Ptr rich(float background) {
-  auto grid = fog("density", background);
-  auto& tree = grid->tree();
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> value(0.0F, 2.0F);
-  for (int i = 0; i < 3000; ++i) {
-    const Coord c(static_cast<int>(random() % 60) - 23, static_cast<int>(random() % 50) - 19,
-                  static_cast<int>(random() % 40) + 5);
-    tree.setValue(c, value(random));
-    if (i % 4 == 0) tree.setValueOff(c.offsetBy(1, 0, 0), value(random));
-  }
-  tree.addTile(1, Coord(64, 0, 0), 0.75F, true);
-  tree.addTile(1, Coord(64, 8, 0), 0.5F, false);
-  tree.addTile(1, Coord(64, 16, 0), background, true);
-  tree.addTile(2, Coord(128, 0, 0), 1.25F, true);
-  tree.addTile(2, Coord(0, 128, 0), 0.375F, false);  // inactive, partly inside the bounds
-  tree.setValue(Coord(30, 140, 3), 3.5F);
-  // Inactive, outside of the active bounds: not a part of the field.
-  tree.setValueOff(Coord(-200, 0, 0), 9.0F);
-  tree.addTile(1, Coord(600, 0, 0), 9.0F, false);
-  // Half inside the bounds.
-  tree.addTile(2, Coord(-128, -128, 0), 0.625F, false);
-  tree.setValue(Coord(-30, -130, 7), 0.25F);
-  return grid;
-}
 
 TEST_F(VolumeImport, EqualsOpenVdbWithBricksTilesAndBackground) {
   for (const float background : {0.0F, 0.125F}) {
@@ -535,102 +372,6 @@ TEST_F(VolumeImport, RejectsInvalidPathsAndContents) {
   EXPECT_HAS(refusal(write_bytes(newer, "newer.vdb")), "format 127 is not supported");
 }
 
-TEST_F(VolumeImport, EveryTruncationIsOneClearLine) {
-  const auto grid = rich(0.125F);
-  const auto vdb = bytes_of(write({grid}));
-  const auto nano_file = path("test.nvdb");
-  std::vector<std::pair<std::string, std::string>> files{{"vdb", vdb}};
-  for (const auto codec : {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP, nanovdb::io::Codec::BLOSC}) {
-    nanovdb::io::writeGrid(nano_file.string(), nanovdb::openToNanoVDB(*grid), codec);
-    files.emplace_back("nvdb", bytes_of(nano_file));
-  }
-  for (const auto& [extension, bytes] : files) {
-    const std::size_t step = bytes.size() / 40;
-    for (std::size_t size = 8; size < bytes.size(); size += size < 400 ? 7 : step) {
-      const std::string what = refusal(write_bytes(bytes.substr(0, size), "cut." + extension));
-      EXPECT_TRUE(what.find("truncated") != std::string::npos || what.find("damaged") != std::string::npos) << what;
-    }
-    refusal(write_bytes(bytes.substr(0, bytes.size() - 1), "cut." + extension));
-  }
-}
-
-TEST_F(VolumeImport, DamagedFilesNeverCrash) {
-#if defined(__SANITIZE_ADDRESS__)
-  __lsan_disable();  // OpenVDB leaks the node that it was reading when its stream throws
-#endif
-  const auto grid = rich(0.125F);
-  const auto vdb_file = path("whole.vdb");
-  openvdb::io::File out(vdb_file.string());
-  out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
-  out.write({grid});
-  const auto nano_file = path("whole.nvdb");
-  std::vector<std::string> files{bytes_of(vdb_file)};
-  for (const auto codec : {nanovdb::io::Codec::NONE, nanovdb::io::Codec::ZIP, nanovdb::io::Codec::BLOSC}) {
-    nanovdb::io::writeGrid(nano_file.string(), nanovdb::openToNanoVDB(*grid), codec);
-    files.push_back(bytes_of(nano_file));
-  }
-  nanovdb::io::writeGrid(nano_file.string(),
-                         nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, nanovdb::FpN>(*grid));
-  files.push_back(bytes_of(nano_file));
-  std::mt19937 random(11);
-  int refused = 0;
-  for (const std::string& whole : files) {
-    for (int i = 0; i < 60; ++i) {
-      std::string bytes = whole;
-      // Half of the damage is in the headers, where it has the largest effect.
-      for (int n = 0; n < 4; ++n) {
-        const std::size_t range = i % 2 == 0 ? std::min<std::size_t>(bytes.size(), 1200) : bytes.size();
-        bytes[8 + random() % (range - 8)] = static_cast<char>(random());
-      }
-      try {
-        expect_contract(import_volume(write_bytes(bytes, "damaged"), "", {}));
-      } catch (const cumulet::Error& e) {
-        EXPECT_EQ(std::string(e.what()).find_first_of("\n\r\t"), std::string::npos);
-        ++refused;
-      }
-    }
-  }
-  EXPECT_GT(refused, 30);
-#if defined(__SANITIZE_ADDRESS__)
-  __lsan_enable();
-#endif
-}
-
-// OpenVDB writes beyond its buffer if the length of packed values is negative.
-TEST_F(VolumeImport, DamagedCompressedLengthsAreReported) {
-  const auto grid = FloatGrid::create();
-  for (int i = 0; i < 40; ++i)
-    grid->tree().setValue(openvdb::Coord(i % 7, i / 7, i % 3), 0.01F * static_cast<float>(i));
-  auto vectors = openvdb::Vec3SGrid::create();
-  vectors->fill(openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(5)), openvdb::Vec3f(1, 2, 3));
-  for (const std::uint32_t compression : {openvdb::io::COMPRESS_ZIP, openvdb::io::COMPRESS_BLOSC}) {
-    openvdb::io::File out(path("packed.vdb").string());
-    out.setCompression(compression);
-    out.write({grid, vectors});
-    const std::string whole = bytes_of(path("packed.vdb"));
-    int found = 0;
-    for (std::size_t at = 200; at + 8 < whole.size(); ++at) {
-      std::int64_t length = 0;
-      std::memcpy(&length, whole.data() + at, sizeof length);
-      // Lengths are in front of bytes that look like the start of zlib or Blosc data.
-      const char first = compression == openvdb::io::COMPRESS_ZIP ? '\x78' : '\x02';
-      if (length < 17 || length > 200'000 || whole[at + 8] != first || found > 5) continue;
-      for (const std::int64_t wrong : {std::int64_t{-300'000}, std::int64_t{1} << 50U, length + 1}) {
-        std::string bytes = whole;
-        std::memcpy(bytes.data() + at, &wrong, sizeof wrong);
-        try {
-          cumulet::volume::Inspection inspection(write_bytes(bytes, "damaged.vdb"));
-          for (std::size_t i = 0; i < inspection.grids().size(); ++i) {
-            if (inspection.statistics(i).refusal.find("wrong size of compressed values") != std::string::npos) ++found;
-          }
-        } catch (const cumulet::Error&) {  // the patched bytes were another field of the file
-        }
-      }
-    }
-    EXPECT_GT(found, 5);
-  }
-}
-
 template <typename BuildT>
 void write_nano(const fs::path& file, const FloatGrid& grid, nanovdb::io::Codec codec) {
   nanovdb::io::writeGrid(file.string(), nanovdb::openToNanoVDB<nanovdb::HostBuffer, openvdb::FloatTree, BuildT>(grid),
@@ -819,124 +560,6 @@ TEST_F(VolumeImport, InspectionReportsGridsValuesAndMetadata) {
   Inspection damaged(write_bytes(bytes, "damaged.nvdb"));
   EXPECT_FALSE(damaged.statistics(0).values);
   EXPECT_HAS(damaged.statistics(0).refusal, "damaged");
-}
-
-// --- optical depth of a volume seen from outside ---
-
-/// A cube of voxels with a density function of the position, from -1 to 1.
-template <class Density>
-ScalarVolume made_of(int side, const Density& density, const glm::dmat4& index_to_world = glm::dmat4(1.0)) {
-  std::vector<float> values;
-  for (int z = 0; z < side; ++z) {
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x)
-        values.push_back(density((glm::vec3(x, y, z) + 0.5F) * (2.0F / static_cast<float>(side)) - 1.0F));
-    }
-  }
-  return cumulet::volume::import_dense({values, glm::ivec3(side), index_to_world}, "made", {});
-}
-
-float ball(glm::vec3 p) { return glm::length(p) < 0.9F ? 1.0F : 0.0F; }
-
-double suggested(const ScalarVolume& volume) {
-  return cumulet::volume::CoarseVolume(volume).suggest_density_scale().value_or(-1.0);
-}
-
-TEST(DensityScale, GivesABallAnOpticalDepthOfEight) {
-  // The mean chord of a ball is 4/3 of its radius. That of a cube is 2/3 of its edge, more without grazing chords.
-  EXPECT_NEAR(suggested(made_of(64, ball)), 8.0 / (4.0 / 3.0 * 0.9 * 32), 0.03 * 0.21);
-  EXPECT_NEAR(suggested(made_of(60, [](glm::vec3) { return 0.25F; })), 8.0 / (0.25 * 40.0), 0.05 * 0.8);
-  EXPECT_FALSE(
-      cumulet::volume::CoarseVolume(made_of(8, [](glm::vec3) { return 0.0F; })).suggest_density_scale().has_value());
-}
-
-TEST(DensityScale, FollowsValuesAndSizesButNotRotation) {
-  const double plain = suggested(made_of(64, ball));
-  EXPECT_NEAR(suggested(made_of(64, [](glm::vec3 p) { return 1e-6F * ball(p); })), 1e6 * plain, 1e4 * plain);
-  EXPECT_NEAR(suggested(made_of(64, [](glm::vec3 p) { return 1e20F * ball(p); })), 1e-20 * plain, 1e-22 * plain);
-  EXPECT_NEAR(suggested(made_of(64, ball, glm::scale(glm::dmat4(1.0), glm::dvec3(0.01)))), 100 * plain, plain);
-  EXPECT_NEAR(suggested(made_of(128, ball)), 0.5 * plain, 0.01 * plain);  // more voxels of the same edge length
-  const auto slab = [](glm::vec3 p) { return std::abs(p.x) < 0.2F && glm::length(p) < 0.9F ? 1.0F : 0.0F; };
-  const double straight = suggested(made_of(64, slab));
-  for (const glm::dvec3 axis : {glm::dvec3(1, 2, 3), glm::dvec3(0, 0, 1), glm::dvec3(-1, 1, 0)}) {
-    const auto turned = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(axis));
-    EXPECT_NEAR(suggested(made_of(64, slab, turned)), straight, 0.06 * straight);
-  }
-}
-
-TEST(DensityScale, IgnoresHazeAndSpecks) {
-  // A ball that fills a seventh of the projection of its bounds.
-  const auto body = [](glm::vec3 p) { return glm::length(p) < 0.4F ? 1.0F : 0.0F; };
-  const double plain = suggested(made_of(64, body));
-  const auto haze = [&](glm::vec3 p) { return std::max(0.004F, body(p)); };
-  EXPECT_NEAR(suggested(made_of(64, haze)), plain, 0.05 * plain);
-  int n = 0;
-  const auto specks = [&](glm::vec3 p) { return body(p) > 0.0F && ++n % 10000 == 0 ? 1e6F : body(p); };
-  EXPECT_NEAR(suggested(made_of(64, specks)), plain, 0.05 * plain);
-}
-
-/// Bounding box in world space of the part that is visible along this direction.
-std::array<glm::dvec3, 2> seen(const ScalarVolume& volume, const glm::dvec3& direction, double scale) {
-  std::array<glm::dvec3, 2> box{glm::dvec3(1e30), glm::dvec3(-1e30)};
-  for (const auto& p : cumulet::volume::CoarseVolume(volume).visible(direction, scale))
-    box = {glm::min(box[0], p), glm::max(box[1], p)};
-  return box;
-}
-
-TEST(VisibleBounds, ExcludeHazeAroundOpaqueContent) {
-  const auto haze = [](glm::vec3 p) { return glm::length(p - glm::vec3(0.3F, 0, 0)) < 0.5F ? 1.0F : 1e-5F; };
-  const auto turn = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(glm::dvec3(1, 2, 3)));
-  for (const glm::dmat4& to_world : {glm::dmat4(1.0), turn, glm::scale(turn, glm::dvec3(0.5))}) {
-    const auto volume = made_of(64, haze, to_world);
-    // Voxel i is centered on i: the ball extends from 25.1 to 57.1 in x, and from 15.5 to 47.5 in y and z.
-    const glm::dvec3 centre(to_world * glm::dvec4(41.1, 31.5, 31.5, 1.0));
-    const double voxel = glm::length(glm::dvec3(to_world[0]));
-    for (const glm::dvec3& direction : {glm::dvec3(0, 0, 1), glm::dvec3(-1, 0, 0), glm::normalize(glm::dvec3(1, 1, 1)),
-                                        glm::normalize(glm::dvec3(-0.3, 0.8, 0.1))}) {
-      const auto points = cumulet::volume::CoarseVolume(volume).visible(direction, 1.0 / voxel);
-      ASSERT_FALSE(points.empty());
-      // Across and along the view direction, the extent is that of the ball within one voxel.
-      const glm::dvec3 u = glm::normalize(glm::cross(direction, glm::dvec3(0.1, 0.2, 0.7)));
-      for (const glm::dvec3& n : {u, -u, glm::cross(u, direction), direction, -direction}) {
-        double reach = -1e30;
-        for (const auto& p : points) reach = std::max(reach, glm::dot(p - centre, n));
-        EXPECT_NEAR(reach, 16.0 * voxel, 1.3 * voxel);
-      }
-    }
-  }
-}
-
-TEST(VisibleBounds, DependOnDensityScaleAndViewDirection) {
-  const auto haze = [](glm::vec3 p) { return glm::length(p) < 0.5F ? 1.0F : 1e-5F; };
-  const auto volume = made_of(64, haze);
-  // With an opaque haze, everything is visible. In a very thin medium, nothing is.
-  const auto [low, high] = seen(volume, {0, 0, 1}, 1e4);
-  EXPECT_NEAR(low.x, -0.5, 1e-6);
-  EXPECT_NEAR(high.y, 63.5, 1e-6);
-  EXPECT_NEAR(low.z, -0.5, 1.0);
-  const auto nothing = cumulet::volume::CoarseVolume(volume).visible({0, 0, 1}, 1e-9);
-  EXPECT_TRUE(nothing.empty());
-  EXPECT_TRUE(cumulet::volume::CoarseVolume(made_of(8, [](glm::vec3) { return 0.0F; })).visible({1, 0, 0}, 1).empty());
-  // A thin sheet across x with a ball at its center. The sheet is opaque only seen edge-on.
-  const auto sheet = [](glm::vec3 p) { return glm::length(p) < 0.3F ? 1.0F : (std::abs(p.x) < 0.05F ? 0.01F : 0.0F); };
-  const auto flat = made_of(64, sheet);
-  EXPECT_NEAR(seen(flat, {1, 0, 0}, 1.0)[1].y, 31.5 + 0.3 * 32, 1.5);
-  EXPECT_NEAR(seen(flat, {0, 0, 1}, 1.0)[1].y, 63.5, 1.0);
-}
-
-TEST(CoarseVolume, ConservesTheMassOfBricksTilesAndBackground) {
-  // Suggested scale (8 over the mean depth) for a mixture of brick, tile and background, compared with the same voxels.
-  cumulet::volume::SparseVoxels voxels;
-  const std::vector<std::int32_t> origins = {0, 0, 0};
-  std::vector<float> values(512, 1.0F);
-  values[0] = 3.0F;
-  voxels.brick_origins = origins;
-  voxels.brick_values = values;
-  voxels.background = 1.0F;
-  voxels.tiles = {{{{8, 0, 0}, {199, 199, 199}, 1.0F}, true}};
-  const auto mixed = cumulet::volume::import_sparse(voxels, "mixed", {});
-  const double all_one = 8.0 / (200.0 * 2.0 / 3.0);  // a cube of one value
-  EXPECT_NEAR(suggested(mixed), all_one, 0.05 * all_one);
 }
 
 // --- the assets under CUMULET_SHARED_DATA, if present ---

@@ -21,6 +21,12 @@ inline Arguments with(const Arguments& more) {
   return all;
 }
 
+inline void expect_rgb(const float (&rgb)[3], float r, float g, float b) {
+  EXPECT_FLOAT_EQ(rgb[0], r);
+  EXPECT_FLOAT_EQ(rgb[1], g);
+  EXPECT_FLOAT_EQ(rgb[2], b);
+}
+
 /// Parses these arguments and the required ones.
 inline demo::RenderOptions parse(const Arguments& more) {
   std::ostringstream out;
