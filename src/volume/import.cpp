@@ -8,10 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <numeric>
 
@@ -52,18 +49,17 @@ std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress
   if (status.type() == fs::file_type::none) fail(error.message());
   if (status.type() == fs::file_type::directory) fail("is a directory");
   if (status.type() != fs::file_type::regular) fail("is not a regular file");
+  return open(open_file(file), progress);
+}
 
+std::unique_ptr<Reader> detail::open(std::unique_ptr<ByteSource> content, Progress* progress) {
   // Recognized by content: a wrong file extension is no error.
   std::array<char, 8> magic{};
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(errno != 0 ? std::strerror(errno) : "cannot be opened");
-  stream.read(magic.data(), magic.size());
-  const auto got = static_cast<std::size_t>(stream.gcount());
+  const std::size_t got = content->read(0, magic.data(), magic.size());
   const std::string_view head(magic.data(), got);
   if (got == 0) fail("is empty");
-  if (head.starts_with("NanoVDB")) return open_nanovdb(file, progress);
-  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(file, progress);
+  if (head.starts_with("NanoVDB")) return open_nanovdb(std::move(content), progress);
+  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(std::move(content), progress);
   if (head.ends_with("BDVonaN")) fail("is a NanoVDB file in big-endian byte order, which is not supported");
   if (head == std::string_view("\0\0\0\0VDB ", 8)) {
     fail("is an OpenVDB file in big-endian byte order, which is not supported");
