@@ -584,6 +584,65 @@ typedef struct cumulet_volume_file_desc {
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
                                                     char* error, size_t error_size);
 
+/**
+ * Reads a part of a host's stream.
+ *
+ * Threads: called on any thread, one call at a time, until the function that received the stream returns. Must not call
+ * the library.
+ *
+ * @param user     cumulet_stream_desc.read_user.
+ * @param position Position of the first byte, less than cumulet_stream_desc.size. Positions do not only increase.
+ * @param bytes    Receives the bytes.
+ * @param size     Bytes to read; position + size is at most cumulet_stream_desc.size.
+ * @return Bytes read. A number other than size is an error, and ends the load.
+ */
+typedef uint64_t (*cumulet_read_fn)(void* user, uint64_t position, void* bytes, uint64_t size);
+
+/** The content of a file that only the host can read, for example an entry of a pak file. */
+typedef struct cumulet_stream_desc {
+  size_t struct_size;
+  uint64_t size; /**< Bytes of the content. */
+  cumulet_read_fn read;
+  void* read_user; /**< First argument of read. */
+} cumulet_stream_desc;
+
+/**
+ * Reads the bytes of a .vdb or .nvdb file, which are recognized by their content.
+ *
+ * Threads: any thread; returns when all is read. No GL.
+ *
+ * @param bytes      The file's content; not used after the call returns.
+ * @param size       Bytes at bytes.
+ * @param desc       The grids and the transform. The file at path is not read: messages use path as the name of the
+ *                   bytes. Without a path they use "memory". NULL: all fields have their defaults.
+ * @param out        Receives the volume, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for a transform as in cumulet_volume_open_file; or
+ *         CUMULET_ERROR_FILE.
+ */
+CUMULET_API cumulet_status cumulet_volume_from_memory(const void* bytes, size_t size,
+                                                      const cumulet_volume_file_desc* desc, cumulet_volume** out,
+                                                      char* error, size_t error_size);
+
+/**
+ * Reads a .vdb or .nvdb file through a callback. Only the parts with the chosen grids are read.
+ *
+ * Threads: any thread; returns when all is read. No GL.
+ *
+ * @param stream     The file's content.
+ * @param desc       The grids and the transform, as in cumulet_volume_from_memory. Without a path, messages use
+ *                   "stream". NULL: all fields have their defaults.
+ * @param out        Receives the volume, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for a transform as in cumulet_volume_open_file; or
+ *         CUMULET_ERROR_FILE, also if the stream fails.
+ */
+CUMULET_API cumulet_status cumulet_volume_from_stream(const cumulet_stream_desc* stream,
+                                                      const cumulet_volume_file_desc* desc, cumulet_volume** out,
+                                                      char* error, size_t error_size);
+
 /** Voxels in a dense box. Active voxels are those that are not zero. */
 typedef struct cumulet_dense_desc {
   size_t struct_size;
@@ -1453,6 +1512,37 @@ CUMULET_API cumulet_status cumulet_surfaces_get_variant(const cumulet_surfaces* 
  */
 CUMULET_API cumulet_status cumulet_environment_open(const char* path, cumulet_environment** out, char* error,
                                                     size_t error_size);
+
+/**
+ * Reads the bytes of a Radiance or OpenEXR file, as cumulet_environment_open reads a file.
+ *
+ * Threads: any thread; returns when it is ready. No GL.
+ *
+ * @param bytes      The file's content; not used after the call returns.
+ * @param size       Bytes at bytes.
+ * @param name       Used in messages in place of the path. NULL: "memory".
+ * @param out        Receives the environment, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or CUMULET_ERROR_FILE.
+ */
+CUMULET_API cumulet_status cumulet_environment_from_memory(const void* bytes, size_t size, const char* name,
+                                                           cumulet_environment** out, char* error, size_t error_size);
+
+/**
+ * Reads a Radiance or OpenEXR file through a callback, in one call.
+ *
+ * Threads: any thread; returns when it is ready. No GL.
+ *
+ * @param stream     The file's content.
+ * @param name       Used in messages in place of the path. NULL: "stream".
+ * @param out        Receives the environment, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or CUMULET_ERROR_FILE, also if the stream fails.
+ */
+CUMULET_API cumulet_status cumulet_environment_from_stream(const cumulet_stream_desc* stream, const char* name,
+                                                           cumulet_environment** out, char* error, size_t error_size);
 
 /** The host's own pixels. */
 typedef struct cumulet_environment_desc {

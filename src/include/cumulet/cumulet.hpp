@@ -262,6 +262,19 @@ template <class Desc>
   return desc;
 }
 
+/// Returns the stream of read(position, std::span<std::byte>), which must outlive it.
+template <class Read>
+[[nodiscard]] cumulet_stream_desc stream_of(std::uint64_t size, Read& read) noexcept {
+  const auto call = [](void* user, std::uint64_t position, void* to, std::uint64_t count) noexcept -> std::uint64_t {
+    return (*static_cast<Read*>(user))(
+        position, std::span<std::byte>(static_cast<std::byte*>(to), static_cast<std::size_t>(count)));
+  };
+  return {.struct_size = sizeof(cumulet_stream_desc),
+          .size = size,
+          .read = call,
+          .read_user = const_cast<void*>(static_cast<const void*>(std::addressof(read)))};
+}
+
 [[nodiscard]] inline const char* or_null(const std::string& text) noexcept {
   return text.empty() ? nullptr : text.c_str();
 }
@@ -346,6 +359,24 @@ class Volume {
     const cumulet_volume_file_desc c = desc;
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
       return cumulet_volume_open_file(&c, out, error, size);
+    });
+  }
+  /// Reads the bytes of a file. desc.path: name in messages; NULL: "memory".
+  [[nodiscard]] static Result<Volume> from_memory(std::span<const std::byte> bytes,
+                                                  const VolumeFileDesc& desc = {}) noexcept {
+    const cumulet_volume_file_desc c = desc;
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_memory(bytes.data(), bytes.size(), &c, out, error, size);
+    });
+  }
+  /// Reads a file of `file_size` bytes by read(position, std::span<std::byte>), which returns the number of bytes read.
+  template <class Read>
+  [[nodiscard]] static Result<Volume> from_stream(std::uint64_t file_size, Read&& read,
+                                                  const VolumeFileDesc& desc = {}) noexcept {
+    const cumulet_volume_file_desc c = desc;
+    const cumulet_stream_desc stream = detail::stream_of(file_size, read);
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_stream(&stream, &c, out, error, size);
     });
   }
   [[nodiscard]] static Result<Volume> from_dense(const DenseDesc& desc) noexcept {
@@ -611,6 +642,22 @@ class Environment {
   [[nodiscard]] static Result<Environment> open(const std::string& path) noexcept {
     return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
       return cumulet_environment_open(path.c_str(), out, error, size);
+    });
+  }
+  /// Reads the bytes of a file. name: in messages; NULL: "memory".
+  [[nodiscard]] static Result<Environment> from_memory(std::span<const std::byte> bytes,
+                                                       const char* name = nullptr) noexcept {
+    return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
+      return cumulet_environment_from_memory(bytes.data(), bytes.size(), name, out, error, size);
+    });
+  }
+  /// Reads a file of `file_size` bytes by read(position, std::span<std::byte>), which returns the number of bytes read.
+  template <class Read>
+  [[nodiscard]] static Result<Environment> from_stream(std::uint64_t file_size, Read&& read,
+                                                       const char* name = nullptr) noexcept {
+    const cumulet_stream_desc stream = detail::stream_of(file_size, read);
+    return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
+      return cumulet_environment_from_stream(&stream, name, out, error, size);
     });
   }
   [[nodiscard]] static Result<Environment> from_pixels(const EnvironmentDesc& desc) noexcept {
