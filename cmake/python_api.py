@@ -43,7 +43,7 @@ CREATE = {"cumulet_camera_create": "__init__", "cumulet_dynamic_volume_create": 
 # Methods whose names do not follow from those of the functions.
 RENAMED = {"cumulet_dynamic_volume_set": "set_state"}
 # Functions that other methods call, or that end handles.
-OTHERWISE = re.compile(r"_(?:retain|release|destroy|get_proc)$|^cumulet_(?:last_error|volume_open)$")
+OTHERWISE = re.compile(r"_(?:retain|release|destroy|get_proc)$|^cumulet_(?:last_error|volume_open|set_display_lut)$")
 ANY_TIME = "Threads: any thread, at any time"
 INDENT = "        "
 

@@ -581,6 +581,13 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
   add_path(app, group, "--oidn-weights", "DIR", options.denoiser,
            "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
            "$XDG_DATA_HOME)");
+  add_path(app, group, "--lut", "FILE", options.lut,
+           "3D LUT (.cube, at most 65^3 points) that replaces the tone map of .png files (default: none)");
+  add_choice(app, group, "--lut-input",
+             std::array{Name{"srgb", CUMULET_LUT_SHAPER_SRGB}, Name{"log2", CUMULET_LUT_SHAPER_LOG2},
+                        Name{"linear", CUMULET_LUT_SHAPER_LINEAR}},
+             options.lut_shaper,
+             "Values that the LUT maps: the sRGB curve, log2 or the value itself of exposed radiance (default: srgb)");
   add_path(app, group, "--shader-cache", "DIR", options.shader_cache, "Cache compiled shaders in this folder");
   add_path(app, group, "--shaders", "DIR", options.shaders,
            "Load shaders from this folder (a copy of glsl/), to compare variants without a build (default: built in)");
@@ -629,6 +636,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (stops && asked && app.count("--spp") == 0) options.scene.sampling.samples = max_samples;
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr output");
+  if (!options.lut.empty() && options.format != OutputFormat::png) throw UsageError("--lut needs a .png output");
+  if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   check_together(options, app.count("--first-sample") > 0);
   // Like every scene setting, it changes the scene hash in the file.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;

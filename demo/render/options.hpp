@@ -62,6 +62,8 @@ struct RenderOptions {
   std::string denoiser;              // folder of networks; empty: denoiser_folder()
   std::vector<cumulet_aov> aovs;     // additional layers of an .exr
   bool cryptomatte = false;          // additional layers of an .exr
+  std::string lut;                   // a .cube file; empty: none
+  cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };

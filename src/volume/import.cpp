@@ -16,6 +16,7 @@
 #include "base/progress_part.hpp"
 #include "volume/bricks.hpp"
 #include "volume/import_detail.hpp"
+#include "volume/source_file.hpp"
 
 namespace cumulet::volume {
 

@@ -301,7 +301,7 @@ struct Caller {
     if (status != expected) wrong.push_back(name + ": " + std::to_string(status));
   }
   void call_all();
-  void call_readers();
+  void call_others();
   static void on_update(void* user) { static_cast<Caller*>(user)->once(); }
   static void on_log(void* user, cumulet_log_level, const char*) { static_cast<Caller*>(user)->once(); }
 
@@ -315,7 +315,7 @@ struct Caller {
 
 #define CALL(function, ...) answer(#function, function(__VA_ARGS__))
 
-void Caller::call_readers() {
+void Caller::call_others() {
   const std::array<std::uint8_t, 4> bytes{};
   const auto stream = make_desc<cumulet_stream_desc>();
   const auto file = make_desc<cumulet_volume_file_desc>();
@@ -328,11 +328,12 @@ void Caller::call_readers() {
   CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
   CALL(cumulet_environment_from_memory, bytes.data(), bytes.size(), nullptr, &new_environment, nullptr, 0);
   CALL(cumulet_environment_from_stream, &stream, nullptr, &new_environment, nullptr, 0);
+  for (cumulet_viewer* v : {viewer, other}) CALL(cumulet_set_display_lut, v, nullptr);
   if (new_volume != nullptr || new_environment != nullptr) wrong.push_back("a reader's handle");
 }
 
 void Caller::call_all() {
-  call_readers();
+  call_others();
   std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   std::array<double, 3> low{}, high{1.0, 1.0, 1.0};
   std::array<float, 4> one{};

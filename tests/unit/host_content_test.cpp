@@ -1,24 +1,20 @@
-// Volumes and environments of the C and C++ API from bytes in memory and from streams of the host.
+// Volumes of the C API from bytes in memory and from streams of the host.
 
-#include <ImfRgbaFile.h>
 #include <cumulet/cumulet.h>
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <openvdb/openvdb.h>
 
-#include <cumulet/cumulet.hpp>
+#include <array>
 #include <fstream>
 #include <iterator>
-#include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "support/c_host.hpp"
 #include "support/folder.hpp"
 #include "support/openvdb.hpp"
-#include "support/radiance.hpp"
 #include "support/volumes.hpp"
 #include "viewer/c_handles.hpp"
 
@@ -27,11 +23,7 @@ namespace {
 using namespace cumulet;
 using openvdb::Coord;
 using test::make_desc;
-
-struct Release {
-  void operator()(cumulet_volume* volume) const { cumulet_volume_release(volume); }
-};
-using VolumePtr = std::unique_ptr<cumulet_volume, Release>;
+using test::VolumeRef;
 
 std::string content_of(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -85,10 +77,10 @@ class HostVolume : public testing::Test {
     nanovdb::io::writeGrid(nvdb_, nanovdb::openToNanoVDB(*openvdb::gridPtrCast<openvdb::FloatGrid>(grids_[0])),
                            nanovdb::io::Codec::ZIP);
   }
-  static VolumePtr open(const std::string& file, const char* grid = nullptr) {
+  static VolumeRef open(const std::string& file, const char* grid = nullptr) {
     cumulet_volume* out = nullptr;
     EXPECT_EQ(cumulet_volume_open(file.c_str(), grid, &out, nullptr, 0), CUMULET_OK);
-    return VolumePtr(out);
+    return VolumeRef(out);
   }
   static cumulet_volume_file_desc named(const char* name, const char* grid = nullptr) {
     auto desc = make_desc<cumulet_volume_file_desc>();
@@ -100,7 +92,7 @@ class HostVolume : public testing::Test {
   struct Answer {
     cumulet_status status;
     std::string line;
-    VolumePtr volume;
+    VolumeRef volume;
   };
   template <class Call>
   static Answer answer(Call&& call) {
@@ -108,7 +100,7 @@ class HostVolume : public testing::Test {
     cumulet_volume* out = nullptr;
     const cumulet_status status = call(&out, line.data(), line.size());
     EXPECT_EQ(std::string(line.data()).find('\n'), std::string::npos);
-    return {status, line.data(), VolumePtr(out)};
+    return {status, line.data(), VolumeRef(out)};
   }
   static Answer from_memory(const std::string& content, const cumulet_volume_file_desc* desc = nullptr) {
     return answer(
@@ -127,7 +119,7 @@ class HostVolume : public testing::Test {
 
 TEST_F(HostVolume, BytesAndStreamsEqualFiles) {
   for (const std::string& file : {vdb_, nvdb_}) {
-    const VolumePtr whole = open(file);
+    const VolumeRef whole = open(file);
     const std::string content = content_of(file);
     const Answer memory = from_memory(content);
     ASSERT_EQ(memory.status, CUMULET_OK) << memory.line;
@@ -196,64 +188,6 @@ TEST_F(HostVolume, InvalidArgumentsAreRefused) {
          "cumulet_stream_desc.size is above 2^62");
   EXPECT_EQ(cumulet_volume_from_memory("x", 1, &desc, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_environment_from_memory("x", 1, nullptr, nullptr, nullptr, 0), CUMULET_ERROR_INVALID_ARGUMENT);
-}
-
-TEST_F(HostVolume, WorksInCpp) {
-  const std::string content = content_of(vdb_);
-  const auto bytes = std::as_bytes(std::span(content));
-  const Volume memory = Volume::from_memory(bytes, {.grid_name = "other"}).value();
-  EXPECT_STREQ(memory.info()->name.c_str(), "other");
-  const auto read = [&](std::uint64_t position, std::span<std::byte> to) -> std::size_t {
-    std::ranges::copy(bytes.subspan(position, to.size()), to.begin());
-    return to.size();
-  };
-  const Volume stream = Volume::from_stream(bytes.size(), read).value();
-  EXPECT_EQ(stream.info()->active_voxels, memory.info()->active_voxels);
-  EXPECT_STREQ(Volume::from_memory(bytes.first(10), {.path = "mine"}).error().message.c_str(),
-               "mine: the file is truncated or damaged: unexpected end of file");
-  EXPECT_STREQ(Environment::from_stream(bytes.size(), read, "mine").error().message.c_str(),
-               "mine: neither a Radiance (.hdr) nor an OpenEXR file");
-}
-
-// ---- environments ----
-
-std::string open_exr_file(const test::Folder& folder) {
-  const std::string file = (folder / "sky.exr").string();
-  const std::vector<Imf::Rgba> pixels(8, Imf::Rgba(1.0F, 2.0F, 3.0F));
-  Imf::RgbaOutputFile out(file.c_str(), 4, 2, Imf::WRITE_RGB);
-  out.setFrameBuffer(pixels.data(), 1, 4);
-  out.writePixels(2);
-  return file;
-}
-
-TEST(HostEnvironment, BytesAndStreamsEqualFiles) {
-  const test::Folder folder;
-  const std::string hdr = (folder / "sky.hdr").string();
-  std::ofstream(hdr, std::ios::binary) << test::radiance_file(8, 4);
-  for (const std::string& file : {hdr, open_exr_file(folder)}) {
-    const std::string content = content_of(file);
-    const auto bytes = std::as_bytes(std::span(content));
-    const EnvironmentInfo whole = Environment::open(file)->info().value();
-    const EnvironmentInfo memory = Environment::from_memory(bytes, "pak:sky")->info().value();
-    Pak pak(content);
-    const auto read = [&](std::uint64_t position, std::span<std::byte> to) {
-      return pak.read(position, to.data(), to.size());
-    };
-    const EnvironmentInfo stream = Environment::from_stream(pak.size, read)->info().value();
-    EXPECT_EQ(memory.width, whole.width);
-    EXPECT_EQ(memory.mean_radiance, whole.mean_radiance);
-    EXPECT_EQ(stream.mean_radiance, whole.mean_radiance);
-    EXPECT_STREQ(memory.name.c_str(), "pak:sky");
-    EXPECT_STREQ(stream.name.c_str(), "stream");
-    const auto cut = Environment::from_memory(bytes.first(bytes.size() - 5), "pak:sky");
-    EXPECT_EQ(cut.error().status, StatusCode::file);
-    EXPECT_EQ(std::string(cut.error().message.c_str()).rfind("pak:sky: ", 0), 0U) << cut.error().message.c_str();
-    pak.fails_from = 4;
-    const auto failed = Environment::from_stream(pak.size, read, "pak:sky");
-    EXPECT_EQ(std::string(failed.error().message.c_str()),
-              "pak:sky: the host's stream returned 3 of " + std::to_string(pak.size) + " bytes at position 0");
-  }
-  EXPECT_STREQ(Environment::from_memory({}).error().message.c_str(), "memory: truncated Radiance file");
 }
 
 }  // namespace

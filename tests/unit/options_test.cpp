@@ -361,6 +361,15 @@ TEST(Options, ModelFlagsNeedAModel) {
   }
 }
 
+TEST(Options, ALutIsForPngs) {
+  const RenderOptions options = parse({"--lut", "look.cube"});
+  EXPECT_EQ(options.lut, "look.cube");
+  EXPECT_EQ(options.lut_shaper, CUMULET_LUT_SHAPER_SRGB);
+  EXPECT_EQ(parse({"--lut", "look.cube", "--lut-input", "log2"}).lut_shaper, CUMULET_LUT_SHAPER_LOG2);
+  EXPECT_EQ(usage_error(with({"--lut", "look.cube", "-o", "a.exr"})), "--lut needs a .png output");
+  EXPECT_EQ(usage_error(with({"--lut-input", "linear"})), "--lut-input needs --lut");
+}
+
 TEST(Options, PartialImageNeedsASampleRangeAndExr) {
   const RenderOptions part = parse({"-o", "a.exr", "--spp", "32", "--first-sample", "96"});
   EXPECT_EQ(part.scene.sampling.first_sample, 96u);

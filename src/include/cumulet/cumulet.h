@@ -3027,6 +3027,51 @@ CUMULET_API cumulet_status cumulet_region_pixels(const float region[4], uint32_t
  */
 CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc);
 
+/** The curve before the lattice of a display LUT. It maps exposed linear Rec. 709 radiance. */
+typedef enum cumulet_lut_shaper {
+  CUMULET_LUT_SHAPER_LINEAR = 0, /**< Radiance itself. */
+  CUMULET_LUT_SHAPER_LOG2 = 1,   /**< log2 of radiance, as of OpenColorIO's allocation lg2. 0 is below each domain. */
+  CUMULET_LUT_SHAPER_SRGB = 2    /**< The sRGB curve. */
+} cumulet_lut_shaper;
+
+/** A display transform of the host: a shaper per channel, and a lattice of colors, for example by OpenColorIO. */
+typedef struct cumulet_display_lut_desc {
+  size_t struct_size;
+  /**
+   * Color of each lattice point, 3 floats, red fastest, then green, then blue. Encoded as for an sRGB display;
+   * interpolated (tetrahedral), then clamped to [0, 1].
+   */
+  const float* values;
+  uint64_t value_count; /**< 3 x size^3. */
+  uint32_t size;        /**< Points per axis, 2 to 65; mostly 17, 33 or 65. */
+  cumulet_lut_shaper shaper;
+  /**
+   * Shaped values at the first and at the last point of an axis, -1e6 to 1e6; values beyond are clamped to them. Both
+   * 0: 0 and 1.
+   */
+  float domain_min;
+  float domain_max;
+} cumulet_display_lut_desc;
+
+/**
+ * Sets or removes a display LUT, which replaces tone_map of cumulet_display_desc and the sRGB encoding in all displayed
+ * images: frames, cumulet_read_display and cumulet_encode_display. exposure_stops is applied before. A change does not
+ * restart accumulation.
+ *
+ * - CUMULET_COLOR_LINEAR and CUMULET_COLOR_SRGB_FRAMEBUFFER get its colors decoded by the sRGB curve.
+ * - CUMULET_COLOR_HDR and debug views do not use it.
+ * - With a transparent background, a pixel's color is that of its radiance over black. Black must stay black, or
+ *   transparent pixels get color.
+ * - It takes 16 bytes per lattice point of GL memory.
+ *
+ * Threads: one call per viewer at a time. No GL.
+ *
+ * @param viewer The viewer.
+ * @param desc   The LUT, which is copied. NULL: none.
+ * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
+ */
+CUMULET_API cumulet_status cumulet_set_display_lut(cumulet_viewer* viewer, const cumulet_display_lut_desc* desc);
+
 /** @} */
 
 /* ---- Camera and input -------------------------------------------------------------------------------------------- */

@@ -618,6 +618,27 @@ class Surfaces {
   cumulet_surfaces* handle_ = nullptr;
 };
 
+// ---- Display LUTs
+// ----------------------------------------------------------------------------------------------------
+
+struct DisplayLutDesc {
+  std::span<const float> values;  ///< 3 per point, red fastest
+  std::uint32_t size = 0;         ///< points per axis
+  LutShaper shaper{};
+  float domain_min = 0.0F;
+  float domain_max = 0.0F;
+
+  operator cumulet_display_lut_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_display_lut_desc),
+            .values = values.data(),
+            .value_count = values.size(),
+            .size = size,
+            .shaper = static_cast<cumulet_lut_shaper>(shaper),
+            .domain_min = domain_min,
+            .domain_max = domain_max};
+  }
+};
+
 // ---- Environments ---------------------------------------------------------------------------------------------------
 
 struct EnvironmentDesc {
@@ -1528,6 +1549,11 @@ class Viewer {
   [[nodiscard]] Result<> set_ground(const GroundDesc& desc) noexcept { return set(cumulet_set_ground, desc); }
   [[nodiscard]] Result<> set_sampling(const SamplingDesc& desc) noexcept { return set(cumulet_set_sampling, desc); }
   [[nodiscard]] Result<> set_display(const DisplayDesc& desc) noexcept { return set(cumulet_set_display, desc); }
+  [[nodiscard]] Result<> set_display_lut(const DisplayLutDesc& desc) noexcept {
+    const cumulet_display_lut_desc c = desc;
+    return result(cumulet_set_display_lut(handle(), &c));
+  }
+  [[nodiscard]] Result<> remove_display_lut() noexcept { return result(cumulet_set_display_lut(handle(), nullptr)); }
 
   [[nodiscard]] Result<> set_camera(const Camera& camera) noexcept {
     return result(cumulet_set_camera(handle(), camera.handle()));
