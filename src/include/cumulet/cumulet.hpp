@@ -622,7 +622,7 @@ class Surfaces {
 // ----------------------------------------------------------------------------------------------------
 
 struct DisplayLutDesc {
-  std::span<const float> values;  ///< 3 per point, red fastest
+  std::span<const float> values{};  ///< 3 per point, red fastest
   std::uint32_t size = 0;         ///< points per axis
   LutShaper shaper{};
   float domain_min = 0.0F;
