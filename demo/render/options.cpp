@@ -6,6 +6,7 @@
 #include <aov_table.hpp>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -137,12 +138,15 @@ std::string ending_of(const std::string& path) {
   return ending;
 }
 
+constexpr std::uint64_t min_thumbnail = 16;
+constexpr std::uint64_t max_thumbnail = 1024;
+
 OutputFormat format_of(const std::string& path) {
   const std::string ending = ending_of(path);
   if (ending == "png") return OutputFormat::png;
   if (ending == "exr") return OutputFormat::exr;
   if (ending == "pfm") return OutputFormat::pfm;
-  throw UsageError(in_quotes(path) + " does not end in .png, .exr or .pfm");
+  throw UsageError("--output: " + in_quotes(path) + " does not end in .png, .exr or .pfm");
 }
 
 /// Formats help for a terminal of 100 columns, with line breaks between words.
@@ -598,6 +602,38 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
              "How to create the OpenGL context without a display (default: auto, which tries EGL, then OSMesa)");
 }
 
+/// Returns the default folder of compiled shaders: cumulet/shaders below $XDG_CACHE_HOME, else below ~/.cache; "" if
+/// neither is set.
+std::string thumbnail_shader_cache() {
+  const auto below = [](const char* variable, const std::string& folder) {
+    const char* value = std::getenv(variable);
+    // By the XDG specification, relative paths are ignored.
+    return value != nullptr && *value == '/' ? value + folder : std::string();
+  };
+  const std::string cache = below("XDG_CACHE_HOME", "/cumulet/shaders");
+  return cache.empty() ? below("HOME", "/.cache/cumulet/shaders") : cache;
+}
+
+/// Sets the options of a thumbnail of options.thumbnail pixels, except those that flags of the app set. Throws
+/// UsageError for flags that exclude it.
+void make_thumbnail(const CLI::App& app, RenderOptions& options) {
+  const auto given = [&app](const char* flag) { return app.count(flag) > 0; };
+  for (const char* flag : {"--size", "--info", "--checkpoint", "--frames", "--aovs", "--first-sample"}) {
+    if (given(flag)) throw UsageError("--thumbnail cannot be combined with " + std::string(flag));
+  }
+  constexpr std::uint32_t samples = 16;
+  constexpr double seconds = 1.5;
+  constexpr std::uint64_t max_cells = 200'000;
+  SceneOptions& scene = options.scene;
+  scene.width = scene.height = *options.thumbnail;
+  options.format = OutputFormat::png;
+  if (!given("--spp")) scene.sampling.samples = samples;
+  if (!given("--time-limit")) options.time_limit = seconds;
+  if (!given("--denoise")) options.denoise = Denoise::fast;
+  if (!given("--max-cells")) scene.grid.max_cells = max_cells;
+  if (!given("--shader-cache")) options.shader_cache = thumbnail_shader_cache();
+}
+
 }  // namespace
 
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
@@ -616,13 +652,17 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   const char* group = "Output";
   add(
-      app, group, "-o,--output", "FILE",
-      [&](const std::string& text) {
-        options.format = format_of(text);
-        options.output = text;
-      },
+      app, group, "-o,--output", "FILE", [&](const std::string& text) { options.output = text; },
       "Output file. .png is exposed and tone-mapped; .exr and .pfm contain linear radiance. For a sequence: "
       "name.####.exr");
+  add(
+      app, group, "--thumbnail", "PIXELS",
+      [&](const std::string& text) {
+        options.thumbnail = static_cast<std::uint32_t>(parse_integer(text, min_thumbnail, max_thumbnail));
+      },
+      "Write a thumbnail for a file manager: a square PNG of 16 to 1024 pixels per side, whatever the file's name, "
+      "with "
+      "few samples and denoised");
   add_sequence_options(app, group, options);
   add_report_options(app, group, options);
   add_sample_options(app, group, options);
@@ -630,6 +670,11 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});
+  if (options.thumbnail) {
+    make_thumbnail(app, options);
+  } else if (!options.output.empty() || app.count("--output") > 0) {
+    options.format = format_of(options.output);
+  }
   // Otherwise the default number of samples would end the image before the noise target or the time limit.
   const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
