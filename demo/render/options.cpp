@@ -190,7 +190,8 @@ class HelpFormatter final : public CLI::Formatter {
 
 void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_path(app, group, "--volume", "FILE", scene.volume,
-           "OpenVDB or NanoVDB file (.vdb, .nvdb), or a sequence such as name.####.vdb");
+           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .raw), or a sequence such as "
+           "name.####.vdb");
   add_text(app, group, "--grid-name", "NAME", scene.grid_name,
            "Density grid (default: density, else the most likely grid)");
   add_text(app, group, "--temperature-grid", "NAME", scene.temperature_grid,
@@ -322,18 +323,22 @@ enum class FileKind { volume, surfaces, scene };
 /// Detects the kind of a file by its extension, else by its content.
 FileKind kind_of(const std::string& path) {
   const std::string ending = ending_of(path);
-  if (ending == "vdb" || ending == "nvdb") return FileKind::volume;
+  constexpr std::array<std::string_view, 5> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "raw"};
+  if (std::ranges::find(volumes, ending) != volumes.end()) return FileKind::volume;
   if (ending == "gltf" || ending == "glb") return FileKind::surfaces;
   if (ending == "json") return FileKind::scene;
   std::string head(4096, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
-  if (head.rfind("NanoVDB", 0) == 0 || head.rfind(" BDV", 0) == 0) return FileKind::volume;
+  for (const char* magic : {"NanoVDB", " BDV", "NRRD0"}) {
+    if (head.rfind(magic, 0) == 0) return FileKind::volume;
+  }
   if (head.rfind("glTF", 0) == 0) return FileKind::surfaces;
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
-  throw UsageError(in_quotes(path) + " is not a volume (.vdb, .nvdb), glTF file (.gltf, .glb) or scene (.json)");
+  throw UsageError(in_quotes(path) +
+                   " is not a volume (.vdb, .nvdb, .nrrd, .raw), glTF file (.gltf, .glb) or scene (.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
@@ -358,7 +363,8 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
     }
   };
   app.add_option_function<std::vector<std::string>>(
-         "files", take, "Volume (.vdb, .nvdb), surfaces (.gltf, .glb) or scene (.json); at most one of each")
+         "files", take,
+         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .raw), surfaces (.gltf, .glb) or scene (.json); at most one of each")
       ->type_name("FILE");
 }
 

@@ -16,7 +16,6 @@
 #include "base/progress_part.hpp"
 #include "volume/bricks.hpp"
 #include "volume/import_detail.hpp"
-#include "volume/source_file.hpp"
 
 namespace cumulet::volume {
 
@@ -40,33 +39,6 @@ ActiveMask detail::not_zero(std::span<const float, brick_voxels> values) {
     mask[i / 64] |= std::uint64_t{values[i] != 0.0F ? 1U : 0U} << (i % 64);
   }
   return mask;
-}
-
-std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress* progress) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found) fail("no such file");
-  if (status.type() == fs::file_type::none) fail(error.message());
-  if (status.type() == fs::file_type::directory) fail("is a directory");
-  if (status.type() != fs::file_type::regular) fail("is not a regular file");
-  return open(open_file(file), progress);
-}
-
-std::unique_ptr<Reader> detail::open(std::unique_ptr<ByteSource> content, Progress* progress) {
-  // Recognized by content: a wrong file extension is no error.
-  std::array<char, 8> magic{};
-  const std::size_t got = content->read(0, magic.data(), magic.size());
-  const std::string_view head(magic.data(), got);
-  if (got == 0) fail("is empty");
-  if (head.starts_with("NanoVDB")) return open_nanovdb(std::move(content), progress);
-  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(std::move(content), progress);
-  if (head.ends_with("BDVonaN")) fail("is a NanoVDB file in big-endian byte order, which is not supported");
-  if (head == std::string_view("\0\0\0\0VDB ", 8)) {
-    fail("is an OpenVDB file in big-endian byte order, which is not supported");
-  }
-  if (got < magic.size()) fail("is too short to be a VDB or NanoVDB file");
-  fail("is not a VDB or NanoVDB file");
 }
 
 namespace {

@@ -152,8 +152,8 @@ TEST_F(HostVolume, BadContentIsOneLineWithTheHostsName) {
     EXPECT_EQ(answer.line, line);
   };
   expect(from_memory("", &desc), "pak:cloud: is empty");
-  expect(from_memory("#?RADIANCE\n", &desc), "pak:cloud: is not a VDB or NanoVDB file");
-  expect(from_memory("abc"), "memory: is too short to be a VDB or NanoVDB file");
+  expect(from_memory("#?RADIANCE\n", &desc), "pak:cloud: is not a VDB, NanoVDB or NRRD file");
+  expect(from_memory("abc"), "memory: is too short to be a VDB, NanoVDB or NRRD file");
   expect(from_memory(content.substr(0, content.size() / 2), &desc),
          "pak:cloud: the file is truncated or damaged: unexpected end of file");
   Pak empty("");
