@@ -667,8 +667,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
         options.thumbnail = static_cast<std::uint32_t>(parse_integer(text, min_thumbnail, max_thumbnail));
       },
       "Write a thumbnail for a file manager: a square PNG of 16 to 1024 pixels per side, whatever the file's name, "
-      "with "
-      "few samples and denoised");
+      "with few samples and denoised");
   add_sequence_options(app, group, options);
   add_report_options(app, group, options);
   add_sample_options(app, group, options);

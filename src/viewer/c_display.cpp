@@ -1,16 +1,16 @@
 // Display settings of the C ABI.
 
-#include <vector>
+#include <memory>
 
 #include "render/display_lut.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_viewer.hpp"
 
-using namespace cumulet;
+namespace {
+
 using namespace cumulet::c_abi;
 namespace core = cumulet::viewer;
-
-namespace {
+namespace render = cumulet::render;
 
 constexpr std::uint32_t min_points = 2;
 constexpr std::uint32_t max_points = 65;
