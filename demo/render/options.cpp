@@ -190,7 +190,7 @@ class HelpFormatter final : public CLI::Formatter {
 
 void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_path(app, group, "--volume", "FILE", scene.volume,
-           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .raw), or a sequence such as "
+           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .vti, .raw), or a sequence such as "
            "name.####.vdb");
   add_text(app, group, "--grid-name", "NAME", scene.grid_name,
            "Density grid (default: density, else the most likely grid)");
@@ -323,7 +323,7 @@ enum class FileKind { volume, surfaces, scene };
 /// Detects the kind of a file by its extension, else by its content.
 FileKind kind_of(const std::string& path) {
   const std::string ending = ending_of(path);
-  constexpr std::array<std::string_view, 5> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "raw"};
+  constexpr std::array<std::string_view, 6> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "vti", "raw"};
   if (std::ranges::find(volumes, ending) != volumes.end()) return FileKind::volume;
   if (ending == "gltf" || ending == "glb") return FileKind::surfaces;
   if (ending == "json") return FileKind::scene;
@@ -364,7 +364,7 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
   };
   app.add_option_function<std::vector<std::string>>(
          "files", take,
-         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .raw), surfaces (.gltf, .glb) or scene (.json); at most one of each")
+         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw), surfaces (.gltf, .glb) or scene (.json); at most one of each")
       ->type_name("FILE");
 }
 

@@ -130,6 +130,87 @@ class GzipPieces final : public Pieces {
   bool ended_ = false;
 };
 
+/// Decodes the zlib blocks of VTK: the number of blocks, the size of a block, that of the last one (0: a whole one),
+/// the compressed size of each block, and the blocks.
+class VtkPieces final : public Pieces {
+ public:
+  VtkPieces(ByteSource& content, const ArrayField& field)
+      : content_(content), field_(field), next_table_(field.first_byte) {
+    const std::uint64_t blocks = number();
+    block_bytes_ = number();
+    const std::uint64_t last_bytes = number();
+    if (blocks > content.size() || block_bytes_ > max_block) fail(damaged);
+    next_block_ = next_table_ + blocks * field.table_number_bytes;
+    left_ = blocks;
+    last_bytes_ = last_bytes == 0 ? block_bytes_ : last_bytes;
+  }
+
+  std::size_t read(char* to, std::size_t count) override {
+    std::size_t done = 0;
+    while (done < count) {
+      if (at_ == block_.size()) {
+        if (left_ == 0) break;
+        decode_next();
+      }
+      const std::size_t bytes = std::min(count - done, block_.size() - at_);
+      std::memcpy(to + done, block_.data() + at_, bytes);
+      at_ += bytes;
+      done += bytes;
+    }
+    return done;
+  }
+
+ private:
+  static constexpr const char* damaged = "the file is damaged: its compressed values cannot be decoded";
+  static constexpr std::uint64_t max_block = std::uint64_t{1} << 30U;
+
+  std::uint64_t number() {
+    std::array<char, 8> raw{};
+    const std::size_t bytes = field_.table_number_bytes;
+    if (next_table_ > content_.size() || content_.read(next_table_, raw.data(), bytes) < bytes) fail(end_of_file);
+    next_table_ += bytes;
+    std::uint64_t number = 0;
+    for (std::size_t i = 0; i < bytes; ++i) {
+      const std::size_t from = field_.big_endian ? i : bytes - 1 - i;
+      number = number << 8U | static_cast<std::uint8_t>(raw.at(from));
+    }
+    return number;
+  }
+
+  void decode_next() {
+    const std::uint64_t bytes = number();
+    if (next_block_ > content_.size() || bytes > content_.size() - next_block_) fail(end_of_file);
+    std::vector<char> packed(static_cast<std::size_t>(bytes));
+    if (content_.read(next_block_, packed.data(), packed.size()) < packed.size()) fail(end_of_file);
+    next_block_ += bytes;
+    --left_;
+    const std::uint64_t wanted = left_ == 0 ? last_bytes_ : block_bytes_;
+    if (wanted == 0 || wanted > max_block || wanted / max_expansion > bytes) fail(damaged);
+    block_.resize(static_cast<std::size_t>(wanted));
+    at_ = 0;
+    auto size = static_cast<uLongf>(block_.size());
+    const int status = uncompress(reinterpret_cast<Bytef*>(block_.data()), &size,
+                                  reinterpret_cast<const Bytef*>(packed.data()), static_cast<uLong>(packed.size()));
+    if (status != Z_OK || size != block_.size()) fail(damaged);
+  }
+
+  ByteSource& content_;
+  const ArrayField& field_;
+  std::uint64_t next_table_;
+  std::uint64_t next_block_ = 0;
+  std::uint64_t left_ = 0;  // blocks
+  std::uint64_t block_bytes_ = 0;
+  std::uint64_t last_bytes_ = 0;
+  std::vector<char> block_;
+  std::size_t at_ = 0;  // in the block
+};
+
+std::unique_ptr<Pieces> open_pieces(ByteSource& content, const ArrayField& field) {
+  if (field.encoding == ArrayEncoding::gzip) return std::make_unique<GzipPieces>(content, field.first_byte);
+  if (field.encoding == ArrayEncoding::vtk_zlib) return std::make_unique<VtkPieces>(content, field);
+  return std::make_unique<PlainPieces>(content, field.first_byte);
+}
+
 template <class T>
 float number_at(const char* bytes, bool swapped) {
   std::array<char, sizeof(T)> raw{};
@@ -214,24 +295,17 @@ void read_text(Pieces& pieces, const ArrayField& field, std::vector<float>& numb
   if (numbers.size() < count) fail_truncated(count, numbers.size());
 }
 
-/// A file with one array. The values are read with the grid, and kept for the sweeps over it.
+/// A file with arrays. The values of a grid are read with it, and kept for the sweeps over it.
 class ArrayReader final : public Reader {
  public:
-  ArrayReader(std::string format, ArrayField field, std::vector<Metadata> metadata, std::unique_ptr<ByteSource> content,
-              Progress* progress)
+  ArrayReader(std::string format, std::vector<ArrayField> fields, std::vector<Metadata> metadata,
+              std::unique_ptr<ByteSource> content, Progress* progress)
       : format_(std::move(format)),
-        field_(std::move(field)),
+        fields_(std::move(fields)),
         metadata_(std::move(metadata)),
         content_(std::move(content)),
         progress_(progress) {
-    const bool scalar = field_.components == 1;
-    GridInfo info;
-    info.name = info.unique_name = field_.name;
-    info.type = scalar ? name_of(field_.type) : "vec3s";
-    info.grid_class = "fog volume";
-    info.refusal = scalar_fog_refusal(info.type, info.grid_class, scalar);
-    info.values = scalar ? Values::scalars : Values::lengths;
-    grids_.push_back(std::move(info));
+    for (const ArrayField& field : fields_) grids_.push_back(info_of(field));
   }
 
   [[nodiscard]] const std::vector<GridInfo>& grids() const override { return grids_; }
@@ -239,37 +313,54 @@ class ArrayReader final : public Reader {
   [[nodiscard]] const std::string& format() const override { return format_; }
   [[nodiscard]] double reading() const override { return 0.5; }
 
-  SourceGrid read(std::size_t /*grid*/, Portion portion, const Log& /*log*/,
-                  const std::string& /*log_prefix*/) override {
-    std::vector<float> numbers = read_numbers(*content_, field_, progress_, portion.part(0.0, 0.7));
-    if (field_.components > 1) {
+  SourceGrid read(std::size_t grid, Portion portion, const Log& /*log*/, const std::string& /*log_prefix*/) override {
+    const ArrayField& field = fields_.at(grid);
+    std::vector<float> numbers = read_numbers(*content_, field, progress_, portion.part(0.0, 0.7));
+    if (field.components > 1) {
       for (std::size_t i = 0; i < numbers.size() / 3; ++i) {
-        numbers[i] =
-            static_cast<float>(glm::length(glm::dvec3(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2])));
+        const glm::dvec3 vector(numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]);
+        numbers[i] = static_cast<float>(glm::length(vector));
       }
       numbers.resize(numbers.size() / 3);
     }
     kept_.assign(1, std::move(numbers));
-    return source(0, portion.part(0.7, 1.0));
+    return source(field, 0, portion.part(0.7, 1.0));
   }
 
-  std::array<SourceGrid, 3> read_vector(std::size_t /*grid*/, Portion portion, const Log& /*log*/,
+  std::array<SourceGrid, 3> read_vector(std::size_t grid, Portion portion, const Log& /*log*/,
                                         const std::string& /*log_prefix*/) override {
-    if (field_.components != 3) fail("is not a field of vectors");
-    const std::vector<float> numbers = read_numbers(*content_, field_, progress_, portion.part(0.0, 0.7));
+    const ArrayField& field = fields_.at(grid);
+    if (field.components != 3) fail("is not a field of vectors");
+    const std::vector<float> numbers = read_numbers(*content_, field, progress_, portion.part(0.0, 0.7));
     kept_.assign(3, std::vector<float>(numbers.size() / 3));
     for (std::size_t i = 0; i < numbers.size(); ++i) kept_[i % 3][i / 3] = numbers[i];
-    return {source(0, portion.part(0.7, 0.8)), source(1, portion.part(0.8, 0.9)), source(2, portion.part(0.9, 1.0))};
+    return {source(field, 0, portion.part(0.7, 0.8)), source(field, 1, portion.part(0.8, 0.9)),
+            source(field, 2, portion.part(0.9, 1.0))};
   }
 
  private:
-  SourceGrid source(std::size_t component, Portion portion) {
-    const DenseVoxels voxels{.values = kept_[component], .size = field_.size, .index_to_world = field_.index_to_world};
+  [[nodiscard]] GridInfo info_of(const ArrayField& field) const {
+    const bool scalar = field.components == 1;
+    GridInfo info;
+    info.name = info.unique_name = field.name;
+    if (std::ranges::count(fields_, field.name, &ArrayField::name) > 1) {
+      const auto before = std::ranges::count(grids_, field.name, &GridInfo::name);
+      info.unique_name += "[" + std::to_string(before) + "]";
+    }
+    info.type = scalar ? name_of(field.type) : "vec3s";
+    info.grid_class = "fog volume";
+    info.refusal = scalar_fog_refusal(info.type, info.grid_class, scalar);
+    info.values = scalar ? Values::scalars : Values::lengths;
+    return info;
+  }
+
+  SourceGrid source(const ArrayField& field, std::size_t component, Portion portion) {
+    const DenseVoxels voxels{.values = kept_[component], .size = field.size, .index_to_world = field.index_to_world};
     return source_of({Channel::density, voxels}, progress_, portion);
   }
 
   std::string format_;
-  ArrayField field_;
+  std::vector<ArrayField> fields_;
   std::vector<Metadata> metadata_;
   std::unique_ptr<ByteSource> content_;
   Progress* progress_;
@@ -303,17 +394,13 @@ std::vector<float> read_numbers(ByteSource& content, const ArrayField& field, Pr
   // Sizes that the content cannot have are refused before memory is allocated.
   std::uint64_t most = bytes;
   if (field.encoding == ArrayEncoding::raw) most = bytes / size_of(field.type);
-  if (field.encoding == ArrayEncoding::gzip) most = std::min(bytes, max_bytes) * max_expansion / size_of(field.type);
+  if (field.encoding == ArrayEncoding::gzip || field.encoding == ArrayEncoding::vtk_zlib)
+    most = std::min(bytes, max_bytes) * max_expansion / size_of(field.type);
   if (count > most) fail_truncated(count, most);
   ProgressPart part(progress, portion.from, portion.to, field.encoding == ArrayEncoding::text ? bytes : count);
   std::vector<float> numbers;
   numbers.reserve(static_cast<std::size_t>(count));
-  std::unique_ptr<Pieces> pieces;
-  if (field.encoding == ArrayEncoding::gzip) {
-    pieces = std::make_unique<GzipPieces>(content, field.first_byte);
-  } else {
-    pieces = std::make_unique<PlainPieces>(content, field.first_byte);
-  }
+  const std::unique_ptr<Pieces> pieces = open_pieces(content, field);
   if (field.encoding == ArrayEncoding::text) {
     read_text(*pieces, field, numbers, part);
   } else {
@@ -326,10 +413,11 @@ std::vector<float> read_numbers(ByteSource& content, const ArrayField& field, Pr
   return numbers;
 }
 
-std::unique_ptr<Reader> make_array_reader(std::string format, ArrayField field, std::vector<Metadata> metadata,
-                                          std::unique_ptr<ByteSource> content, Progress* progress) {
-  check_array_size(field);
-  return std::make_unique<ArrayReader>(std::move(format), std::move(field), std::move(metadata), std::move(content),
+std::unique_ptr<Reader> make_array_reader(std::string format, std::vector<ArrayField> fields,
+                                          std::vector<Metadata> metadata, std::unique_ptr<ByteSource> content,
+                                          Progress* progress) {
+  for (const ArrayField& field : fields) check_array_size(field);
+  return std::make_unique<ArrayReader>(std::move(format), std::move(fields), std::move(metadata), std::move(content),
                                        progress);
 }
 

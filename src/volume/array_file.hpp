@@ -24,7 +24,8 @@ std::optional<NumberType> number_type_of(std::string_view name);
 const char* name_of(NumberType type);
 std::size_t size_of(NumberType type);
 
-enum class ArrayEncoding { raw, gzip, text };
+/// vtk_zlib: blocks of zlib data behind a table of their sizes.
+enum class ArrayEncoding { raw, gzip, text, vtk_zlib };
 
 /// An array of one or three numbers per voxel, and its place in a content.
 struct ArrayField {
@@ -36,6 +37,7 @@ struct ArrayField {
   ArrayEncoding encoding = ArrayEncoding::raw;
   bool big_endian = false;
   std::uint64_t first_byte = 0;
+  std::size_t table_number_bytes = 4;  ///< vtk_zlib: bytes of each number of the table
 
   [[nodiscard]] std::uint64_t numbers() const {
     const glm::u64vec3 voxels(size);
@@ -48,14 +50,18 @@ void check_array_size(const ArrayField& field);
 /// Reads the numbers of a field as floats. Throws std::runtime_error if the content has too few.
 std::vector<float> read_numbers(ByteSource& content, const ArrayField& field, Progress* progress, Portion portion);
 
-/// Makes a reader of a file with one array. format: as of Reader.
-std::unique_ptr<Reader> make_array_reader(std::string format, ArrayField field, std::vector<Metadata> metadata,
-                                          std::unique_ptr<ByteSource> content, Progress* progress);
+/// Makes a reader of a file with arrays. format: as of Reader.
+std::unique_ptr<Reader> make_array_reader(std::string format, std::vector<ArrayField> fields,
+                                          std::vector<Metadata> metadata, std::unique_ptr<ByteSource> content,
+                                          Progress* progress);
 
 /// Opens a NRRD file (http://teem.sourceforge.net/nrrd/format.html). folder: that of detached data; nullopt: such files
 /// are refused.
 std::unique_ptr<Reader> open_nrrd(std::unique_ptr<ByteSource> content,
                                   const std::optional<std::filesystem::path>& folder, Progress* progress);
+
+/// Opens a file of VTK's image data (.vti) whose arrays are appended as raw bytes.
+std::unique_ptr<Reader> open_vti(std::unique_ptr<ByteSource> content, Progress* progress);
 
 /// Returns the JSON file that describes a .raw file: NAME.raw.json or NAME.json; nullopt if there is none.
 std::optional<std::filesystem::path> raw_description_of(const std::filesystem::path& file);

@@ -258,7 +258,7 @@ std::unique_ptr<Reader> open_nrrd(std::unique_ptr<ByteSource> content,
     if (field.encoding != ArrayEncoding::raw) fail("has \"byte skip: -1\" and an encoding other than raw");
     field.first_byte = content->size() - std::min(content->size(), bytes);
   }
-  return make_array_reader(header.format(), std::move(field), header.metadata(), std::move(content), progress);
+  return make_array_reader(header.format(), {std::move(field)}, header.metadata(), std::move(content), progress);
 }
 
 }  // namespace cumulet::volume::detail

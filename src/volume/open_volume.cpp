@@ -1,6 +1,7 @@
 // Recognizes the format of a volume file.
 
 #include <array>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -22,6 +23,12 @@ bool begins_with(ByteSource& content, std::string_view magic) {
 }
 
 bool is_nrrd(ByteSource& content) { return begins_with(content, "NRRD0"); }
+
+bool is_vtk(ByteSource& content) {
+  std::string head(256, '\0');
+  head.resize(content.read(0, head.data(), head.size()));
+  return head.find("<VTKFile") != std::string::npos;
+}
 
 }  // namespace
 
@@ -45,6 +52,7 @@ std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress
 
 std::unique_ptr<Reader> detail::open(std::unique_ptr<ByteSource> content, Progress* progress) {
   if (is_nrrd(*content)) return open_nrrd(std::move(content), std::nullopt, progress);
+  if (is_vtk(*content)) return open_vti(std::move(content), progress);
   // Recognized by content: a wrong file extension is no error.
   std::array<char, 8> magic{};
   const std::size_t got = content->read(0, magic.data(), magic.size());

@@ -92,7 +92,7 @@ std::unique_ptr<Reader> open_raw(std::unique_ptr<ByteSource> content, const std:
   } catch (const std::runtime_error& cause) {
     fail(description.filename().string() + ": " + cause.what());
   }
-  return make_array_reader("raw", std::move(field), {}, std::move(content), progress);
+  return make_array_reader("raw", {std::move(field)}, {}, std::move(content), progress);
 }
 
 }  // namespace cumulet::volume::detail
