@@ -32,14 +32,14 @@ layout(location = 7) uniform uint cm_lut_shaper;
 layout(location = 8) uniform vec2 cm_lut_domain;
 layout(binding = CM_UNIT_DISPLAY_LUT) uniform sampler3D cm_lut;  // encoded colors; red is the first axis
 
-// Linear color of exposed radiance.
+// Encoded color of exposed radiance.
 vec3 cm_lut_color(vec3 exposed) {
   vec3 position;
   for (int c = 0; c < 3; ++c) position[c] = cm_lut_position(exposed[c], cm_lut_shaper, cm_lut_domain);
   CmLutCell cell = cm_lut_cell(position, textureSize(cm_lut, 0).x);
   vec3 color = vec3(0.0);
   for (int i = 0; i < 4; ++i) color += cell.weights[i] * texelFetch(cm_lut, cell.points[i], 0).rgb;
-  return cm_srgb_decode_each(clamp(color, vec3(0.0), vec3(1.0)));
+  return clamp(color, vec3(0.0), vec3(1.0));
 }
 #endif
 #if CM_LAYERS
@@ -134,7 +134,9 @@ void main() {
   vec4 value = cm_texel(pixel);
 #endif
 #if CM_LUT
-  cm_color = cm_color_over(cm_lut_color(cm_exposed(value.rgb, cm_exposure)), value.a, CM_ENCODE);
+  vec3 encoded = cm_lut_color(cm_exposed(value.rgb, cm_exposure));
+  vec3 linear = cm_srgb_decode_each(encoded);
+  cm_color = CM_ENCODE ? cm_encoded_over(linear, encoded, value.a) : cm_linear_over(linear, value.a);
 #else
   cm_color = cm_display_over(value, cm_exposure, CM_TONE_MAP, CM_ENCODE);
 #endif

