@@ -233,7 +233,7 @@ TEST_P(LutFrames, FramesMatchTheReferenceInEachEncoding) {
     for (std::size_t i = 0; i < linear.size(); ++i) {
       if (i % 4 == 3) continue;
       const float encoded = expected[i / 4][static_cast<int>(i % 4)];
-      const long byte = std::lround(255.0F * encoded);
+      const int byte = static_cast<int>(std::lround(255.0F * encoded));
       ASSERT_NEAR(bytes[i], byte, 1) << i;
       ASSERT_NEAR(drawn[i], byte, 1) << i;
       ASSERT_NEAR(decoded[i], byte, 1) << i;
