@@ -2,7 +2,10 @@
 
 #include <array>
 #include <fstream>
+#include <program.hpp>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "option_values.hpp"
 
