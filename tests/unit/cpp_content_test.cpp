@@ -32,7 +32,8 @@ TEST(CppContent, VolumesComeFromBytesAndStreams) {
   for (const char* name : {"density", "other"}) {
     auto grid = openvdb::FloatGrid::create(0.0F);
     grid->setName(name);
-    for (int i = 0; i < 900; ++i) grid->tree().setValue(openvdb::Coord(i % 31, i % 17, i % 13), 1.0F + 0.5F * i);
+    for (int i = 0; i < 900; ++i)
+      grid->tree().setValue(openvdb::Coord(i % 31, i % 17, i % 13), 1.0F + 0.5F * static_cast<float>(i));
     grids.push_back(grid);
   }
   const std::string file = (folder / "cloud.vdb").string();
