@@ -4,6 +4,7 @@
 # A program that links a static libcumulet need not be in this folder.
 set(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL ${CUMULET_STATIC})
 include(CumuletLibraries)
+include(CumuletPrivate)
 
 if(CUMULET_NANOVDB)
   find_path(CUMULET_NANOVDB_INCLUDE_DIR nanovdb/NanoVDB.h HINTS ${CUMULET_OPENVDB_ROOT} PATH_SUFFIXES include REQUIRED)

@@ -115,6 +115,9 @@ if(TARGET cumulet-demo)
   set(desktop ${PROJECT_SOURCE_DIR}/demo/desktop)
   install(FILES ${desktop}/cumulet-demo.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT programs)
   install(FILES ${desktop}/cumulet.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/mime/packages COMPONENT programs)
+  install(FILES ${desktop}/cumulet.thumbnailer DESTINATION ${CMAKE_INSTALL_DATADIR}/thumbnailers COMPONENT programs)
+  install(FILES ${desktop}/org.cumulet.cumulet.metainfo.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo
+          COMPONENT programs)
   install(FILES ${desktop}/cumulet.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps
           COMPONENT programs)
 endif()

@@ -36,13 +36,14 @@ CREATE = {"cumulet_camera_create": "__init__", "cumulet_dynamic_volume_create": 
           "cumulet_headless_create": "__init__", "cumulet_surfaces_open": "from_file",
           "cumulet_environment_open": "from_file", "cumulet_volume_open_file": "from_file",
           "cumulet_sequence_create": "__init__", "cumulet_volume_from_dense": "from_dense",
+          "cumulet_volume_from_memory": "from_bytes", "cumulet_environment_from_memory": "from_bytes",
           "cumulet_volume_from_sparse": "from_sparse", "cumulet_volume_from_fields": "from_states",
           "cumulet_surfaces_from_memory": "from_bytes", "cumulet_surfaces_from_triangles": "from_triangles",
           "cumulet_environment_from_pixels": "from_values"}
 # Methods whose names do not follow from those of the functions.
 RENAMED = {"cumulet_dynamic_volume_set": "set_state"}
 # Functions that other methods call, or that end handles.
-OTHERWISE = re.compile(r"_(?:retain|release|destroy|get_proc)$|^cumulet_(?:last_error|volume_open)$")
+OTHERWISE = re.compile(r"_(?:retain|release|destroy|get_proc)$|^cumulet_(?:last_error|volume_open|set_display_lut)$")
 ANY_TIME = "Threads: any thread, at any time"
 INDENT = "        "
 
@@ -282,25 +283,24 @@ class Generator:
         """{parameter: (signature, expression)} of parameters that are arrays. The parameter with their length has no
         signature."""
         found = {}
-        reads = function.name in READS
-        lengths = [p.name for p in function.parameters if p.name in ("count", "size") and not reads]
+        counted = any(p.name == "count" for p in function.parameters) and function.name not in READS
         for p in function.parameters:
             kind = base(p.type)
             if not p.type.startswith("const") or not p.type.endswith("*"):
                 continue
             if p.name == "bytes":
                 found[p.name] = "bytes: Any", '*_support.bytes_of(bytes, "bytes")'
-            elif kind == "double" and lengths:
+            elif kind == "double" and counted:
                 found[p.name] = f"{p.name}: Iterable[Matrix]", f'_support.matrices({p.name}, "{p.name}")'
             elif kind == "double":
                 hint, convert = ("Matrix", "matrix") if p.name == "to_world" else ("float", "seconds")
                 found[p.name] = f"{p.name}: {hint} | None = None", f'_support.{convert}({p.name}, "{p.name}")'
             elif kind == "float" and p.name == "points":
                 found[p.name] = f"{p.name}: Iterable[Tuple[float, float]]", f'_support.pairs({p.name}, "{p.name}")'
-            elif lengths and self.is_descriptor(kind):
+            elif counted and self.is_descriptor(kind):
                 found[p.name] = (f"{p.name}: Iterable[Mapping[str, Any]]",
                                  f'_support.structs(api.{kind}, {p.name}, "{p.name}")')
-        if "count" in lengths and found:
+        if counted and found:
             found["count"] = None, f"_support.length_of({', '.join(name for name in found)})"
         elif "bytes" in found:
             found["size"] = None, None

@@ -30,6 +30,7 @@ const int CM_UNIT_SUM_BEFORE = 3;
 const int CM_UNIT_COUNTS_BEFORE = 4;
 const int CM_UNIT_BACKGROUND = 5;
 const int CM_UNIT_BACKGROUND_BEFORE = 6;
+const int CM_UNIT_DISPLAY_LUT = 7;
 // host_depth.comp:
 const int CM_UNIT_DEPTH_SOURCE = 0;
 // pack_bricks.comp:

@@ -1,14 +1,17 @@
 #version 450
 // Draws an accumulation as displayed color, or its depth. Variants, not uniforms, select the work per pixel, because
 // software drivers execute both sides of every branch. CM_LAYERS 1: surfaces at the size of the rectangle lie below, in
-// front of the background.
-// variants: CM_DEPTH=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false CM_LAYERS=1
+// front of the background. CM_LUT 1: a display LUT replaces the tone curve.
+// variants: CM_DEPTH=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_TONE_MAP=0u,1u,2u,3u CM_ENCODE=true,false CM_LAYERS=1 or CM_DEPTH=0 CM_BILINEAR=0,1 CM_RESOLVED=0,1 CM_ENCODE=true,false CM_LUT=1 or CM_DEPTH=0 CM_BILINEAR=1 CM_RESOLVED=0,1 CM_ENCODE=true,false CM_LAYERS=1 CM_LUT=1
 #ifndef CM_LAYERS
 #define CM_LAYERS 0
 #endif
+#ifndef CM_LUT
+#define CM_LUT 0
+#endif
 #include "bindings.glsl"
 #include "shared.glsl"
-#include "display.glsl"
+#include "display_lut.glsl"
 
 layout(binding = CM_UNIT_SUM) uniform sampler2D cm_sum;  // row 0 is the image's top; CM_RESOLVED: means
 layout(binding = CM_UNIT_COUNTS) uniform usampler2D cm_counts;
@@ -24,6 +27,21 @@ layout(location = 6) uniform bool cm_with_background;  // false: without the bac
 layout(binding = CM_UNIT_BACKGROUND) uniform sampler2D cm_background;  // mean radiance
 #endif
 layout(location = 0) out vec4 cm_color;
+#if CM_LUT
+layout(location = 7) uniform uint cm_lut_shaper;
+layout(location = 8) uniform vec2 cm_lut_domain;
+layout(binding = CM_UNIT_DISPLAY_LUT) uniform sampler3D cm_lut;  // encoded colors; red is the first axis
+
+// Encoded color of exposed radiance.
+vec3 cm_lut_color(vec3 exposed) {
+  vec3 position;
+  for (int c = 0; c < 3; ++c) position[c] = cm_lut_position(exposed[c], cm_lut_shaper, cm_lut_domain);
+  CmLutCell cell = cm_lut_cell(position, textureSize(cm_lut, 0).x);
+  vec3 color = vec3(0.0);
+  for (int i = 0; i < 4; ++i) color += cell.weights[i] * texelFetch(cm_lut, cell.points[i], 0).rgb;
+  return clamp(color, vec3(0.0), vec3(1.0));
+}
+#endif
 #if CM_LAYERS
 layout(binding = CM_UNIT_LAYER_COLOR) uniform sampler2DArray cm_layer_color;
 layout(binding = CM_UNIT_LAYER_Z) uniform sampler2DArray cm_layer_z;
@@ -115,7 +133,13 @@ void main() {
 #else
   vec4 value = cm_texel(pixel);
 #endif
+#if CM_LUT
+  vec3 encoded = cm_lut_color(cm_exposed(value.rgb, cm_exposure));
+  vec3 linear = cm_srgb_decode_each(encoded);
+  cm_color = CM_ENCODE ? cm_encoded_over(linear, encoded, value.a) : cm_linear_over(linear, value.a);
+#else
   cm_color = cm_display_over(value, cm_exposure, CM_TONE_MAP, CM_ENCODE);
+#endif
 #else
   float z = texelFetch(cm_volume_z, min(ivec2(at), size - 1), 0).x;
   if (!cm_is_positive(z)) discard;

@@ -45,7 +45,8 @@ struct App::Commands {
        }},
       {Action::open_dialog,
        [](App& app, const Command&) {
-         app.open_dialog("Open", Action::open, {".vdb", ".nvdb", ".gltf", ".glb", ".hdr", ".exr", ".json"});
+         app.open_dialog("Open", Action::open,
+                         {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw", ".gltf", ".glb", ".hdr", ".exr", ".json"});
        }},
       {Action::open,
        [](App& app, const Command& command) {
@@ -53,7 +54,9 @@ struct App::Commands {
          app.open(command.text);
        }},
       {Action::add_volume_dialog,
-       [](App& app, const Command&) { app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb"}); }},
+       [](App& app, const Command&) {
+         app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw"});
+       }},
       {Action::add_volume,
        [](App& app, const Command& command) {
          SceneVolume& added = app.model_.scene.others.emplace_back();

@@ -26,6 +26,7 @@
 
 #include "aovs.hpp"
 #include "checkpoint.hpp"
+#include "cube_lut.hpp"
 #include "denoised.hpp"
 #include "early_pictures.hpp"
 #include "fire.hpp"
@@ -559,6 +560,11 @@ class Studio {
     cumulet_display_desc display = scene.display;
     display.denoise = CUMULET_DENOISE_OFF;  // the image is read without denoising, and denoised separately
     check(viewer_, cumulet_set_display(viewer_.get(), &display));
+    if (!options.lut.empty()) {
+      const cumulet::demo::CubeLut lut = cumulet::demo::read_cube_lut(options.lut);
+      const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut, options.lut_shaper);
+      check(viewer_, cumulet_set_display_lut(viewer_.get(), &desc));
+    }
     cumulet::demo::show_camera(viewer_, scene);
     if (!scene.models.empty()) check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
     if (!scene.surfaces.empty()) {

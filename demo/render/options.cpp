@@ -6,6 +6,7 @@
 #include <aov_table.hpp>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -137,12 +138,15 @@ std::string ending_of(const std::string& path) {
   return ending;
 }
 
+constexpr std::uint64_t min_thumbnail = 16;
+constexpr std::uint64_t max_thumbnail = 1024;
+
 OutputFormat format_of(const std::string& path) {
   const std::string ending = ending_of(path);
   if (ending == "png") return OutputFormat::png;
   if (ending == "exr") return OutputFormat::exr;
   if (ending == "pfm") return OutputFormat::pfm;
-  throw UsageError(in_quotes(path) + " does not end in .png, .exr or .pfm");
+  throw UsageError("--output: " + in_quotes(path) + " does not end in .png, .exr or .pfm");
 }
 
 /// Formats help for a terminal of 100 columns, with line breaks between words.
@@ -186,7 +190,8 @@ class HelpFormatter final : public CLI::Formatter {
 
 void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_path(app, group, "--volume", "FILE", scene.volume,
-           "OpenVDB or NanoVDB file (.vdb, .nvdb), or a sequence such as name.####.vdb");
+           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .vti, .raw), or a sequence such as "
+           "name.####.vdb");
   add_text(app, group, "--grid-name", "NAME", scene.grid_name,
            "Density grid (default: density, else the most likely grid)");
   add_text(app, group, "--temperature-grid", "NAME", scene.temperature_grid,
@@ -318,18 +323,22 @@ enum class FileKind { volume, surfaces, scene };
 /// Detects the kind of a file by its extension, else by its content.
 FileKind kind_of(const std::string& path) {
   const std::string ending = ending_of(path);
-  if (ending == "vdb" || ending == "nvdb") return FileKind::volume;
+  constexpr std::array<std::string_view, 6> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "vti", "raw"};
+  if (std::ranges::find(volumes, ending) != volumes.end()) return FileKind::volume;
   if (ending == "gltf" || ending == "glb") return FileKind::surfaces;
   if (ending == "json") return FileKind::scene;
   std::string head(4096, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
-  if (head.rfind("NanoVDB", 0) == 0 || head.rfind(" BDV", 0) == 0) return FileKind::volume;
+  for (const char* magic : {"NanoVDB", " BDV", "NRRD0"}) {
+    if (head.rfind(magic, 0) == 0) return FileKind::volume;
+  }
   if (head.rfind("glTF", 0) == 0) return FileKind::surfaces;
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
-  throw UsageError(in_quotes(path) + " is not a volume (.vdb, .nvdb), glTF file (.gltf, .glb) or scene (.json)");
+  throw UsageError(in_quotes(path) +
+                   " is not a volume (.vdb, .nvdb, .nrrd, .raw), glTF file (.gltf, .glb) or scene (.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
@@ -354,7 +363,8 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
     }
   };
   app.add_option_function<std::vector<std::string>>(
-         "files", take, "Volume (.vdb, .nvdb), surfaces (.gltf, .glb) or scene (.json); at most one of each")
+         "files", take,
+         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw), surfaces (.gltf, .glb) or scene (.json); at most one of each")
       ->type_name("FILE");
 }
 
@@ -581,6 +591,13 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
   add_path(app, group, "--oidn-weights", "DIR", options.denoiser,
            "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
            "$XDG_DATA_HOME)");
+  add_path(app, group, "--lut", "FILE", options.lut,
+           "3D LUT (.cube, at most 65^3 points) that replaces the tone map of .png files (default: none)");
+  add_choice(app, group, "--lut-input",
+             std::array{Name{"srgb", CUMULET_LUT_SHAPER_SRGB}, Name{"log2", CUMULET_LUT_SHAPER_LOG2},
+                        Name{"linear", CUMULET_LUT_SHAPER_LINEAR}},
+             options.lut_shaper,
+             "Values that the LUT maps: the sRGB curve, log2 or the value itself of exposed radiance (default: srgb)");
   add_path(app, group, "--shader-cache", "DIR", options.shader_cache, "Cache compiled shaders in this folder");
   add_path(app, group, "--shaders", "DIR", options.shaders,
            "Load shaders from this folder (a copy of glsl/), to compare variants without a build (default: built in)");
@@ -598,6 +615,38 @@ Denoise default_denoise(const RenderOptions& options, bool has_scene) {
                         scene.surface.lighting != CUMULET_SURFACE_LIGHTING_RASTERIZED;
   const bool wanted = !has_scene || scene.display.denoise != CUMULET_DENOISE_OFF;
   return possible && wanted ? Denoise::fast : Denoise::off;
+}
+
+/// Returns the default folder of compiled shaders: cumulet/shaders below $XDG_CACHE_HOME, else below ~/.cache; "" if
+/// neither is set.
+std::string thumbnail_shader_cache() {
+  const auto below = [](const char* variable, const std::string& folder) {
+    const char* value = std::getenv(variable);
+    // By the XDG specification, relative paths are ignored.
+    return value != nullptr && *value == '/' ? value + folder : std::string();
+  };
+  const std::string cache = below("XDG_CACHE_HOME", "/cumulet/shaders");
+  return cache.empty() ? below("HOME", "/.cache/cumulet/shaders") : cache;
+}
+
+/// Sets the options of a thumbnail of options.thumbnail pixels, except those that flags of the app set. Throws
+/// UsageError for flags that exclude it.
+void make_thumbnail(const CLI::App& app, RenderOptions& options) {
+  const auto given = [&app](const char* flag) { return app.count(flag) > 0; };
+  for (const char* flag : {"--size", "--info", "--checkpoint", "--frames", "--aovs", "--first-sample"}) {
+    if (given(flag)) throw UsageError("--thumbnail cannot be combined with " + std::string(flag));
+  }
+  constexpr std::uint32_t samples = 16;
+  constexpr double seconds = 1.5;
+  constexpr std::uint64_t max_cells = 200'000;
+  SceneOptions& scene = options.scene;
+  scene.width = scene.height = *options.thumbnail;
+  options.format = OutputFormat::png;
+  if (!given("--spp")) scene.sampling.samples = samples;
+  if (!given("--time-limit")) options.time_limit = seconds;
+  if (!given("--denoise")) options.denoise = Denoise::fast;
+  if (!given("--max-cells")) scene.grid.max_cells = max_cells;
+  if (!given("--shader-cache")) options.shader_cache = thumbnail_shader_cache();
 }
 
 }  // namespace
@@ -619,13 +668,16 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   const char* group = "Output";
   add(
-      app, group, "-o,--output", "FILE",
-      [&](const std::string& text) {
-        options.format = format_of(text);
-        options.output = text;
-      },
+      app, group, "-o,--output", "FILE", [&](const std::string& text) { options.output = text; },
       "Output file. .png is exposed and tone-mapped; .exr and .pfm contain linear radiance. For a sequence: "
       "name.####.exr");
+  add(
+      app, group, "--thumbnail", "PIXELS",
+      [&](const std::string& text) {
+        options.thumbnail = static_cast<std::uint32_t>(parse_integer(text, min_thumbnail, max_thumbnail));
+      },
+      "Write a thumbnail for a file manager: a square PNG of 16 to 1024 pixels per side, whatever the file's name, "
+      "with few samples and denoised");
   add_sequence_options(app, group, options);
   add_report_options(app, group, options);
   add_sample_options(app, group, options);
@@ -633,6 +685,11 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
   finish_scene_options(app, options.scene, {.scene = lit});
+  if (options.thumbnail) {
+    make_thumbnail(app, options);
+  } else if (!options.output.empty() || app.count("--output") > 0) {
+    options.format = format_of(options.output);
+  }
   // Otherwise the default number of samples would end the image before the noise target or the time limit.
   const bool stops = options.time_limit || options.scene.sampling.noise_target_percent > 0.0f;
   const bool asked = app.count("--noise-target") + app.count("--time-limit") > 0;
@@ -640,6 +697,8 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (app.count("--light-groups") > 0 && !options.scene.light_groups.empty() && options.format != OutputFormat::exr)
     throw UsageError("--light-groups needs an .exr output");
   const bool part = app.count("--first-sample") > 0;
+  if (!options.lut.empty() && options.format != OutputFormat::png) throw UsageError("--lut needs a .png output");
+  if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   options.denoises_by_default = app.count("--denoise") == 0;
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);
   check_together(options, part);

@@ -54,15 +54,18 @@ struct RenderOptions {
       sequence_cache;  // sequence cache: file with the settings shared by all frames; empty: derive them in each run
   bool info = false;   // print the content of the files, render nothing
   bool json = false;   // print `info` as JSON
-  std::string checkpoint;            // empty: none
-  double checkpoint_every = 300.0;   // seconds
-  std::optional<double> time_limit;  // seconds from the first sample
-  std::uint64_t gpu_memory = 0;      // bytes; 0: no limit
-  Denoise denoise = Denoise::off;    // for .exr, the denoised image is an additional layer
-  bool denoises_by_default = false;  // --denoise is not given
-  std::string denoiser;              // folder of networks; empty: denoiser_folder()
-  std::vector<cumulet_aov> aovs;     // additional layers of an .exr
-  bool cryptomatte = false;          // additional layers of an .exr
+  std::string checkpoint;                  // empty: none
+  double checkpoint_every = 300.0;         // seconds
+  std::optional<double> time_limit;        // seconds from the first sample
+  std::uint64_t gpu_memory = 0;            // bytes; 0: no limit
+  Denoise denoise = Denoise::off;          // for .exr, the denoised image is an additional layer
+  bool denoises_by_default = false;        // --denoise is not given
+  std::string denoiser;                    // folder of networks; empty: denoiser_folder()
+  std::vector<cumulet_aov> aovs;           // additional layers of an .exr
+  bool cryptomatte = false;                // additional layers of an .exr
+  std::optional<std::uint32_t> thumbnail;  // pixels per side
+  std::string lut;                         // a .cube file; empty: none
+  cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };

@@ -26,6 +26,7 @@ FUNCTION: Any = api.cumulet_release_fn.__mro__[1]  # the base of all types of ca
 MAX_LINE = 1024
 AOV_FLOATS = {api.Aov.BEAUTY: 4, api.Aov.VOLUME: 4, api.Aov.NORMAL: 3, api.Aov.ALBEDO: 3, api.Aov.VELOCITY: 3,
               api.Aov.MOTION: 2, api.Aov.VOLUME_MOTION: 2}  # others have 1
+PIECE = 1 << 20  # bytes that a stream reads at a time
 EXIT_SECONDS = 10.0  # for a running call of another thread, when a viewer is closed
 
 
@@ -380,6 +381,40 @@ def length_of(first: Any, *others: Any) -> int:
 def bytes_of(values: Any, name: str) -> Any:
     array = Array(values, name, "uint8")
     return array.pointer(), array.count
+
+
+def stream_of(file: Any, raised: list[BaseException]) -> Any:
+    """The content of a binary file object. Exceptions of its methods are added to a list."""
+    def read(position: int, address: int, size: int) -> int:
+        try:
+            file.seek(position)
+            done = 0
+            while done < size:
+                piece = file.read(min(size - done, PIECE))
+                if not piece:
+                    break
+                ctypes.memmove(address + done, piece, len(piece))
+                done += len(piece)
+            return done
+        except BaseException as cause:
+            raised.append(cause)
+            return 0
+
+    return fill(api.cumulet_stream_desc, {"size": file.seek(0, os.SEEK_END), "read": read})
+
+
+def from_stream(kind: str, function: Any, file: Any, described: Any) -> Any:
+    """The handle that a function of the C API creates from a file object."""
+    raised: list[BaseException] = []
+    stream = stream_of(file, raised)
+    out = function.argtypes[2]._type_()
+    try:
+        call(function, ctypes.byref(stream), described, ctypes.byref(out))
+    except Error:
+        if raised:
+            raise raised[0] from None
+        raise
+    return wrap(kind, out)
 
 
 # --- arrays ----------------------------------------------------------------------------------------------------------

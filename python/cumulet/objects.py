@@ -43,8 +43,20 @@ def fields_of(channels: Mapping[str, Any], matrix: Any, axes: str) -> List[Dict[
 
 
 class Volume(_methods.VolumeMethods):
-    """Immutable voxels. Created by from_file, from_numpy, from_fields, and the functions of the C API from_dense,
-    from_sparse and from_states."""
+    """Immutable voxels. Created by from_file, from_bytes, from_stream, from_numpy, from_fields, and the functions of the
+    C API from_dense, from_sparse and from_states."""
+
+    @classmethod
+    def from_stream(cls, file: Any, name: str = "stream", **grids: Any) -> Volume:
+        """Creates a volume from a binary file object with seek and read, for example an entry of a ZipFile.
+
+        name: Name in messages.
+        grids: The keyword arguments of from_file.
+
+        C: cumulet_volume_from_stream.
+        """
+        described = _support.fill_from(api.cumulet_volume_file_desc, {"path": name, **grids}, "grids")
+        return _support.from_stream("Volume", api.cumulet_volume_from_stream, file, ctypes.byref(described))
 
     @classmethod
     def from_numpy(cls, density: Any, *, voxel_size: float | None = None, origin: SequenceOf[float] | None = None,
@@ -118,7 +130,15 @@ class Surfaces(_methods.SurfacesMethods):
 
 
 class Environment(_methods.EnvironmentMethods):
-    """An environment map. Created by from_file or from_pixels."""
+    """An environment map. Created by from_file, from_bytes, from_stream or from_pixels."""
+
+    @classmethod
+    def from_stream(cls, file: Any, name: str = "stream") -> Environment:
+        """Creates an environment from a binary file object with seek and read. C: cumulet_environment_from_stream.
+
+        name: Name in messages.
+        """
+        return _support.from_stream("Environment", api.cumulet_environment_from_stream, file, _support.text(name))
 
     @classmethod
     def from_pixels(cls, values: Any, *, name: str | None = None) -> Environment:

@@ -212,6 +212,23 @@ class Viewer(_methods.ViewerMethods):
         receive = _support.callback(api.cumulet_object_name_fn, address)
         return self._read(api.cumulet_read_cryptomatte, 2 * ranks, receive, None, ranks)
 
+    def set_display_lut(self, values: Any = None, *, shaper: api.LutShaper | str = "linear",
+                        domain: Tuple[float, float] = (0.0, 1.0)) -> None:
+        """Sets a display LUT, or removes it without values. C: cumulet_set_display_lut.
+
+        values: Encoded colors, float32 (size, size, size, 3), indexed [blue, green, red].
+        shaper: The curve before the lattice: "linear", "log2" or "srgb".
+        domain: Shaped values at the first and at the last point of an axis.
+        """
+        if values is None:
+            self._call(api.cumulet_set_display_lut, None)
+            return
+        array = Array(values, "values", "float32", (None, None, None, 3))
+        desc = _support.fill(api.cumulet_display_lut_desc, {
+            "values": array.view, "size": array.shape[0], "shaper": shaper, "domain_min": domain[0],
+            "domain_max": domain[1]})
+        self._call(api.cumulet_set_display_lut, ctypes.byref(desc))
+
     def read_display(self) -> memoryview:
         """Reads the image as it is displayed, uint8 (height, width, 4), straight alpha. C: cumulet_read_display."""
         memory, view = _support.new_array(ctypes.c_uint8, *self._size, 4)

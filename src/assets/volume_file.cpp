@@ -26,6 +26,14 @@ VolumeAssetPtr VolumeFile::read(const Log& log, Progress* progress,
   };
   volume::VolumeFrame frame = take_proxy ? volume::import_frame(path, grids, log, progress, {take, min_proxy_bricks})
                                          : volume::import_frame(path, grids, log, progress);
+  return asset_of(std::move(frame), progress);
+}
+
+VolumeAssetPtr VolumeFile::read_content(std::unique_ptr<ByteSource> content, const Log& log) const {
+  return asset_of(volume::import_frame(std::move(content), path.given(), grids, log), nullptr);
+}
+
+VolumeAssetPtr VolumeFile::asset_of(volume::VolumeFrame frame, Progress* progress) const {
   transform(frame, to_world);
   frame.temperature_scale = temperature_scale;
   try {

@@ -3,9 +3,11 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <memory>
 #include <optional>
 
 #include "assets/volume_asset.hpp"
+#include "base/byte_source.hpp"
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
@@ -29,6 +31,11 @@ struct VolumeFile {
   /// take_proxy: receives the low-resolution proxy from import_frame(), transformed by to_world.
   [[nodiscard]] VolumeAssetPtr read(const Log& log, Progress* progress,
                                     const std::function<void(volume::Proxy)>& take_proxy) const;
+  /// Reads the content in place of the file; the path is the name in messages.
+  [[nodiscard]] VolumeAssetPtr read_content(std::unique_ptr<ByteSource> content, const Log& log) const;
+
+ private:
+  [[nodiscard]] VolumeAssetPtr asset_of(volume::VolumeFrame frame, Progress* progress) const;
 };
 
 }  // namespace cumulet::viewer

@@ -244,8 +244,8 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
 const gl::Program* Compositor::color_program(const Kind& kind, const Display& display, Wait wait) {
   std::vector<std::string> defines{gl::macros::depth(0), gl::macros::bilinear(kind.bilinear),
                                    gl::macros::resolved(kind.resolved),
-                                   gl::macros::tone_map(std::to_string(curve_of(display)) + "u"),
                                    gl::macros::encode(kind.encoding == ColorEncoding::srgb ? "true" : "false")};
+  defines.push_back(kind.lut ? gl::macros::lut(1) : gl::macros::tone_map(std::to_string(curve_of(display)) + "u"));
   if (kind.layered) defines.push_back(gl::macros::layers(1));
   const bool serves = color_ != nullptr && color_kind_ == kind;  // color_ can be used meanwhile
   const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
@@ -337,6 +337,11 @@ void Compositor::bind_color(const Shown& shown, const PictureTextures& picture, 
   const glm::vec3 backdrop = display.backdrop.value_or(glm::vec3(0.0F));
   gl.ProgramUniform3f(color, 4, backdrop.x, backdrop.y, backdrop.z);
   if (shown.layered || !resolved) gl.ProgramUniform1i(color, 6, as_bool(display.shows_background()));
+  if (shown.lut != 0) {
+    gl.BindTextureUnit(core::CM_UNIT_DISPLAY_LUT, shown.lut);
+    gl.ProgramUniform1ui(color, 7, static_cast<GLuint>(display.lut->shaper));
+    gl.ProgramUniform2f(color, 8, display.lut->domain.x, display.lut->domain.y);
+  }
   if (shown.layered) {
     const SurfaceLayers& layers = *picture.beneath;
     gl.BindTextureUnit(core::CM_UNIT_LAYER_COLOR, layers.color.name());
@@ -454,7 +459,7 @@ void Compositor::draw_enlarged(const gl::Program& enlarge, const Shown& shown, c
 }
 
 std::uint64_t Compositor::bytes() const {
-  std::uint64_t bytes = wavelet_.bytes() + composed_.bytes();
+  std::uint64_t bytes = wavelet_.bytes() + composed_.bytes() + lut_.bytes();
   for (const auto& means : means_) {
     bytes += std::uint64_t{means->of.size.x} * means->of.size.y * (means->background ? 32 : 16);
   }
@@ -479,22 +484,25 @@ void Compositor::draw(const PictureTextures& picture, const Display& display, co
   const bool resolved = means != nullptr || lags_;
   const glm::uvec2 size = means != nullptr ? means->of.size : picture.size;
   const bool bilinear = layered || glm::ivec2(size) != glm::ivec2(viewport.z, viewport.w);
-  const gl::Program* const shown = color_program({layered, resolved, bilinear, display.encoding}, display, target.wait);
+  const DisplayLutPtr lut = lut_of(display);
+  const Kind kind{layered, resolved, bilinear, lut != nullptr, display.encoding};
+  const gl::Program* const color = color_program(kind, display, target.wait);
   const gl::Program* enlarge = nullptr;
   if (layered && glm::ivec2(picture.beneath->size) != glm::ivec2(viewport.z, viewport.w)) {
     enlarge = &program({"enlarge.frag", {}, "composite.vert"}, target.wait, false);
     if (!enlarge->usable()) lags_ = true;
   }
-  if ((resolved && means == nullptr) || shown == nullptr || (enlarge != nullptr && !enlarge->usable())) return;
+  if ((resolved && means == nullptr) || color == nullptr || (enlarge != nullptr && !enlarge->usable())) return;
   composed_rows_.reset();
+  if (!lut) lut_.drop();
+  const Shown shown{means, color, layered, lut ? lut_.of(lut) : 0U};
   if (enlarge != nullptr) {
-    draw_enlarged(*enlarge, {means, shown, layered}, picture, display, target);
+    draw_enlarged(*enlarge, shown, picture, display, target);
   } else {
     small_ = {};
     // The surfaces beneath a picture may change while the picture does not.
-    const bool composed =
-        means != nullptr && !layered && draw_composed({means, shown, layered}, picture, display, target, format);
-    if (!composed) draw_color({means, shown, layered}, picture, display, target);
+    const bool composed = means != nullptr && !layered && draw_composed(shown, picture, display, target, format);
+    if (!composed) draw_color(shown, picture, display, target);
   }
   if (layered || means == nullptr) composed_.drop();
   if (target.write_depth && picture.volume_z != 0) draw_depth(picture, target);

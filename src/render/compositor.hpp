@@ -13,6 +13,7 @@
 #include "render/composed.hpp"
 #include "render/display.hpp"
 #include "render/frame_target.hpp"
+#include "render/lut_texture.hpp"
 #include "render/picture_textures.hpp"
 #include "render/region.hpp"
 #include "render/target_format.hpp"
@@ -27,7 +28,7 @@ namespace cumulet::render {
 class Compositor {
  public:
   Compositor(gl::FunctionsPtr gl, gl::ProgramsPtr programs)
-      : gl_(std::move(gl)), programs_(std::move(programs)), composed_(gl_), wavelet_(gl_, programs_) {}
+      : gl_(std::move(gl)), programs_(std::move(programs)), composed_(gl_), lut_(gl_), wavelet_(gl_, programs_) {}
   /// Draws the picture. Draws nothing if there is no picture or the rectangle is empty. Writes color to draw buffer 0
   /// only, without a depth test: cm_display_over() of glsl/display.glsl, from premultiplied radiance. Throws
   /// Error(invalid_argument) as check_target().
@@ -83,6 +84,7 @@ class Compositor {
     bool layered = false;
     bool resolved = false;
     bool bilinear = false;
+    bool lut = false;
     ColorEncoding encoding = ColorEncoding::srgb;
     bool operator==(const Kind&) const = default;
   };
@@ -96,6 +98,7 @@ class Compositor {
     const Means* means = nullptr;  // null: reads the picture's sums
     const gl::Program* program = nullptr;
     bool layered = false;
+    GLuint lut = 0;  // 0: the program has a tone curve
   };
   // Binds the framebuffer, and sets the viewport, scissor, blending and encoding. Until the draw ends, nothing outside
   // the region is written.
@@ -155,6 +158,7 @@ class Compositor {
   std::optional<glm::uvec2> no_memory_for_;  // size that did not fit; retried when the size changes
   std::optional<Error> unreported_;          // error to be thrown by the next draw
   std::optional<glm::uvec2> cannot_filter_;  // size of pictures that cannot be denoised
+  LutTexture lut_;
   Wavelet wavelet_;
   MeansOf filtering_;             // means that are being denoised
   double filtering_ms_ = 0.0;     // time for it, over all frames so far

@@ -9,11 +9,7 @@
 #include <optional>
 #include <span>
 
-#include "base/shared_code.hpp"
-
-namespace cumulet::core {
-#include "display.glsl"
-}  // namespace cumulet::core
+#include "render/display_lut.hpp"
 
 namespace cumulet::render {
 
@@ -29,6 +25,7 @@ struct Display {
   std::optional<glm::vec3> backdrop{};  // opaque: radiance that replaces the background
   ColorEncoding encoding = ColorEncoding::srgb;
   bool denoise = false;
+  DisplayLutPtr lut{};  // replaces the tone curve, except for legends and for ColorEncoding::hdr
   bool operator==(const Display&) const = default;
 
   /// True if the background's radiance is part of the displayed image.
@@ -44,11 +41,22 @@ inline std::uint32_t curve_of(const Display& display) {
   return display.legend ? CM_TONE_MAP_CLIP : static_cast<std::uint32_t>(display.tone_map);
 }
 
+/// Returns the LUT that replaces the tone curve; null if there is none.
+inline DisplayLutPtr lut_of(const Display& display) {
+  return display.legend || display.encoding == ColorEncoding::hdr ? nullptr : display.lut;
+}
+
+/// Converts exposed radiance to an sRGB-encoded color by the LUT, or by the curve if the LUT is null.
+inline glm::vec3 encoded_color(const glm::vec3& exposed, std::uint32_t curve, const DisplayLut* lut) {
+  return lut != nullptr ? encoded_color(*lut, core::cm_exposed(exposed, 1.0F))
+                        : core::cm_display(exposed, 1.0F, curve, true);
+}
+
 /// Converts premultiplied, exposed radiance to an sRGB-encoded color with straight alpha. If radiance does not exceed
 /// alpha, the color is display(radiance / alpha) and alpha is unchanged. Radiance beyond that, as of emission, has no
 /// straight color. The excess is treated as light from the uncovered part of the pixel, and alpha is raised until it
 /// can hold the color. Over black nothing is lost.
-inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve) {
+inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve, const DisplayLut* lut = nullptr) {
   const float alpha = std::min(core::cm_displayable(exposed.w), 1.0F);
   glm::vec3 covering(0.0F);
   glm::vec3 emissive(0.0F);
@@ -58,8 +66,8 @@ inline glm::vec4 straight_display(const glm::vec4& exposed, std::uint32_t curve)
     emissive[c] = glows ? radiance - alpha : 0.0F;
     if (alpha > 0.0F) covering[c] = glows ? radiance + (1.0F - alpha) : radiance / alpha;
   }
-  const glm::vec3 color = alpha * core::cm_display(covering, 1.0F, curve, true) +
-                          (1.0F - alpha) * core::cm_display(emissive, 1.0F, curve, true);
+  const glm::vec3 color =
+      alpha * encoded_color(covering, curve, lut) + (1.0F - alpha) * encoded_color(emissive, curve, lut);
   const float raised = std::max({alpha, color.x, color.y, color.z});
   return raised > 0.0F ? glm::vec4(color / raised, raised) : glm::vec4(0.0F);
 }
@@ -74,9 +82,10 @@ inline void to_display(std::span<const float> linear, const Display& display, st
   encoded.encoding = ColorEncoding::srgb;
   const float exposure = exposure_of(encoded);
   const std::uint32_t curve = curve_of(encoded);
+  const DisplayLutPtr lut = lut_of(encoded);
   for (std::size_t i = 0; i + 4 <= linear.size(); i += 4) {
     const glm::vec3 exposed = exposure * glm::vec3(linear[i], linear[i + 1], linear[i + 2]);
-    const glm::vec4 color = straight_display({exposed, display.transparent ? linear[i + 3] : 1.0F}, curve);
+    const glm::vec4 color = straight_display({exposed, display.transparent ? linear[i + 3] : 1.0F}, curve, lut.get());
     for (int c = 0; c < 4; ++c) bytes[i + static_cast<std::size_t>(c)] = to_byte(color[c]);
   }
 }

@@ -528,10 +528,6 @@ cumulet_status cumulet_region_pixels(const float region[4], uint32_t width, uint
   return CUMULET_OK;
 }
 
-cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_display(core::DisplaySettings::of(read_settings(desc))); });
-}
-
 // ---- camera and input ----
 
 cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds) {

@@ -5,6 +5,7 @@
 #include "light/environment.hpp"
 #include "light/environment_file.hpp"
 #include "viewer/c_handles.hpp"
+#include "viewer/c_stream.hpp"
 #include "viewer/c_support.hpp"
 
 using namespace cumulet;
@@ -14,6 +15,23 @@ cumulet_status cumulet_environment_open(const char* path, cumulet_environment** 
   return make_handle(out, error, error_size, [&] {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
     return light::open_environment(path);
+  });
+}
+
+cumulet_status cumulet_environment_from_memory(const void* bytes, size_t size, const char* name,
+                                               cumulet_environment** out, char* error, size_t error_size) {
+  return make_handle(out, error, error_size, [&] {
+    const std::string what = name_or(name, "memory");
+    MemorySource content(array_of(static_cast<const std::byte*>(bytes), size, 1, what + ": bytes"));
+    return light::read_environment_content(content, what);
+  });
+}
+
+cumulet_status cumulet_environment_from_stream(const cumulet_stream_desc* stream, const char* name,
+                                               cumulet_environment** out, char* error, size_t error_size) {
+  return make_handle(out, error, error_size, [&] {
+    HostStream content(stream);
+    return light::read_environment_content(content, name_or(name, "stream"));
   });
 }
 

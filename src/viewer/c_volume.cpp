@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "viewer/c_handles.hpp"
+#include "viewer/c_stream.hpp"
 #include "viewer/c_support.hpp"
 #include "volume/inspection.hpp"
 #include "volume/memory.hpp"
@@ -51,19 +52,40 @@ volume::SparseVoxels c_abi::to_sparse(const cumulet_sparse_desc* desc, const std
   return voxels;
 }
 
-viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
-  const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
-  require(d.path != nullptr && *d.path != '\0', "path is NULL or empty");
+namespace {
+
+// The file of a descriptor, with a path that is not checked.
+viewer::VolumeFile volume_file_of(const cumulet_volume_file_desc& d, const std::string& path) {
   const glm::dmat4 m = matrix_or_identity(d.to_world);
   require_transform(m);
   require(d.suggested_density_scale == 0 || d.suggested_density_scale == 1,
           "suggested_density_scale is neither 0 nor 1");
   const auto name = [](const char* given) { return std::string(given == nullptr ? "" : given); };
-  return {d.path,
+  return {path,
           {name(d.grid_name), name(d.temperature_grid), name(d.flame_grid), name(d.color_grid), name(d.anisotropy_grid),
            name(d.velocity_grid)},
           m,
           d.suggested_density_scale == 1};
+}
+
+// Reads content in place of a file. otherwise: its name if the descriptor has none.
+viewer::VolumeAssetPtr read_content(std::unique_ptr<ByteSource> content, const cumulet_volume_file_desc* desc,
+                                    const char* otherwise) {
+  cumulet_volume_file_desc d{};
+  if (desc != nullptr) d = read_desc(desc, "cumulet_volume_file_desc");
+  return volume_file_of(d, name_or(d.path, otherwise)).read_content(std::move(content), log_of(d.log, d.log_user));
+}
+
+std::string name_of(const cumulet_volume_file_desc* desc, const char* otherwise) {
+  return desc == nullptr ? otherwise : name_or(read_desc(desc, "cumulet_volume_file_desc").path, otherwise);
+}
+
+}  // namespace
+
+viewer::VolumeFile c_abi::to_volume_file(const cumulet_volume_file_desc* desc) {
+  const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
+  require(d.path != nullptr && *d.path != '\0', "path is NULL or empty");
+  return volume_file_of(d, d.path);
 }
 
 cumulet_status cumulet_volume_open(const char* path, const char* grid_name, cumulet_volume** out, char* error,
@@ -82,6 +104,20 @@ cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cu
     const cumulet_volume_file_desc d = read_desc(desc, "cumulet_volume_file_desc");
     return file.read(log_of(d.log, d.log_user), nullptr);
   });
+}
+
+cumulet_status cumulet_volume_from_memory(const void* bytes, size_t size, const cumulet_volume_file_desc* desc,
+                                          cumulet_volume** out, char* error, size_t error_size) {
+  return make_handle(out, error, error_size, [&] {
+    const auto content = array_of(static_cast<const std::byte*>(bytes), size, 1, name_of(desc, "memory") + ": bytes");
+    return read_content(std::make_unique<MemorySource>(content), desc, "memory");
+  });
+}
+
+cumulet_status cumulet_volume_from_stream(const cumulet_stream_desc* stream, const cumulet_volume_file_desc* desc,
+                                          cumulet_volume** out, char* error, size_t error_size) {
+  return make_handle(out, error, error_size,
+                     [&] { return read_content(std::make_unique<HostStream>(stream), desc, "stream"); });
 }
 
 cumulet_status cumulet_volume_from_dense(const cumulet_dense_desc* desc, cumulet_volume** out, char* error,

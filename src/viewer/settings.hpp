@@ -45,6 +45,7 @@ struct DisplaySettings {
   bool transparent = false;
   std::optional<glm::vec3> backdrop{};
   bool denoise = false;
+  render::DisplayLutPtr lut{};
 
   static DisplaySettings of(const cumulet_display_desc& d) {
     DisplaySettings settings{
@@ -63,6 +64,7 @@ struct DisplaySettings {
     display.transparent = transparent;
     if (!legend) display.backdrop = backdrop;
     display.denoise = denoise && !legend;
+    display.lut = lut;
     return display;
   }
 };

@@ -138,7 +138,14 @@ void Viewer::set_sampling(const Sampling& sampling) {
 }
 
 void Viewer::set_display(const DisplaySettings& display) {
+  render::DisplayLutPtr lut = std::move(display_.lut);
   display_ = display;
+  display_.lut = std::move(lut);
+  touch();
+}
+
+void Viewer::set_display_lut(render::DisplayLutPtr lut) {
+  display_.lut = std::move(lut);
   touch();
 }
 

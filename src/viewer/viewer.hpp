@@ -155,7 +155,10 @@ class Viewer final : private StageHost {
   const light::EnvironmentPtr& environment() { return stage_.sky.environment(); }
   void set_ground(const GroundSettings& settings) { stage_.sky.set_ground(settings); }
   void set_sampling(const Sampling& sampling);
+  /// The LUT of the settings is ignored.
   void set_display(const DisplaySettings& display);
+  /// Null: none.
+  void set_display_lut(render::DisplayLutPtr lut);
   void set_camera(std::shared_ptr<Camera> camera) { stage_.camera.set_camera(std::move(camera)); }
   [[nodiscard]] const std::shared_ptr<Camera>& camera() const { return stage_.camera.camera(); }
   /// Sets the camera of the previous frame, `seconds` ago; null: the camera has not moved.

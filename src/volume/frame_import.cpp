@@ -532,6 +532,11 @@ constexpr std::uint64_t min_bytes_per_brick = 128;
 
 }  // namespace
 
+VolumeFrame import_frame(std::unique_ptr<ByteSource> content, const std::string& name, const GridNames& names,
+                         const Log& log) {
+  return naming(name, [&] { return FrameImport(name, log, nullptr).run(*open(std::move(content), nullptr), names); });
+}
+
 VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress,
                          const ProxyRequest& proxy) {
   return naming(file.given(), [&] {

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/byte_source.hpp"
 #include "base/file_path.hpp"
 #include "base/log.hpp"
 #include "base/progress.hpp"
@@ -64,6 +66,9 @@ std::vector<std::string> channels_by_name(const std::vector<GridInfo>& grids);
 /// velocities that are clamped. An info message reports color in three grids that is not read. Another one reports
 /// temperatures that are taken as kelvin, or that look like degrees Celsius or like a range from 0 to 1.
 VolumeFrame import_frame(const FilePath& file, const GridNames& names, const Log& log, Progress* progress = nullptr);
+/// Like the other import_frame, for the content of a file. name: prefix of every message.
+VolumeFrame import_frame(std::unique_ptr<ByteSource> content, const std::string& name, const GridNames& names,
+                         const Log& log);
 
 /// A file with this many bricks takes about a second of one core to load.
 inline constexpr std::uint64_t worth_a_proxy = 50'000;

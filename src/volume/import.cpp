@@ -8,10 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <limits>
 #include <numeric>
 
@@ -42,34 +39,6 @@ ActiveMask detail::not_zero(std::span<const float, brick_voxels> values) {
     mask[i / 64] |= std::uint64_t{values[i] != 0.0F ? 1U : 0U} << (i % 64);
   }
   return mask;
-}
-
-std::unique_ptr<Reader> detail::open(const std::filesystem::path& file, Progress* progress) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (status.type() == fs::file_type::not_found) fail("no such file");
-  if (status.type() == fs::file_type::none) fail(error.message());
-  if (status.type() == fs::file_type::directory) fail("is a directory");
-  if (status.type() != fs::file_type::regular) fail("is not a regular file");
-
-  // Recognized by content: a wrong file extension is no error.
-  std::array<char, 8> magic{};
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(errno != 0 ? std::strerror(errno) : "cannot be opened");
-  stream.read(magic.data(), magic.size());
-  const auto got = static_cast<std::size_t>(stream.gcount());
-  const std::string_view head(magic.data(), got);
-  if (got == 0) fail("is empty");
-  if (head.starts_with("NanoVDB")) return open_nanovdb(file, progress);
-  if (head == std::string_view(" BDV\0\0\0\0", 8)) return open_vdb(file, progress);
-  if (head.ends_with("BDVonaN")) fail("is a NanoVDB file in big-endian byte order, which is not supported");
-  if (head == std::string_view("\0\0\0\0VDB ", 8)) {
-    fail("is an OpenVDB file in big-endian byte order, which is not supported");
-  }
-  if (got < magic.size()) fail("is too short to be a VDB or NanoVDB file");
-  fail("is not a VDB or NanoVDB file");
 }
 
 namespace {

@@ -19,6 +19,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/byte_source.hpp"
 #include "base/error.hpp"
 #include "base/log.hpp"
 #include "base/one_line.hpp"
@@ -153,6 +154,7 @@ class Reader {
 
 /// Opens a file; its format is recognized by content, not by name.
 std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress);
+std::unique_ptr<Reader> open(std::unique_ptr<ByteSource> content, Progress* progress);
 /// Returns the grid that import_volume reads for this name, or without a name. Throws as import_volume does.
 std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name);
 /// Returns the usable grid with this name, or else this unique name. Throws if there is none, or several.
@@ -192,8 +194,8 @@ std::vector<std::string> remarks_on_case(const std::vector<GridInfo>& grids, con
 std::string describe(const std::vector<GridInfo>& grids, std::span<const std::size_t> which);
 std::string lower_case(std::string text);
 
-std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress);
-std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress* progress);
+std::unique_ptr<Reader> open_vdb(std::unique_ptr<ByteSource> content, Progress* progress);
+std::unique_ptr<Reader> open_nanovdb(std::unique_ptr<ByteSource> content, Progress* progress);
 
 /// The shared part of the importer: converts a source's tree to a valid ScalarVolume.
 ScalarVolume assemble(SourceGrid source, const Log& log, const std::string& log_prefix, Progress* progress,

@@ -214,9 +214,9 @@ class NanoWalk {
 /// A .nvdb file. NanoVDB's own reader is not used: it does not validate sizes.
 class NanoReader final : public Reader {
  public:
-  NanoReader(const std::filesystem::path& file, Progress* progress)
+  NanoReader(std::unique_ptr<ByteSource> content, Progress* progress)
       : progress_(progress),
-        stream_(file, progress),
+        stream_(std::move(content), progress),
         size_(static_cast<std::uint64_t>(stream_.size())),
         directory_(read_nano_directory(stream_)) {}
 
@@ -398,8 +398,8 @@ class NanoReader final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_nanovdb(const std::filesystem::path& file, Progress* progress) {
-  return std::make_unique<NanoReader>(file, progress);
+std::unique_ptr<Reader> open_nanovdb(std::unique_ptr<ByteSource> content, Progress* progress) {
+  return std::make_unique<NanoReader>(std::move(content), progress);
 }
 
 }  // namespace cumulet::volume::detail

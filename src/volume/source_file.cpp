@@ -1,32 +1,68 @@
 #include "volume/source_file.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <ios>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 namespace cumulet::volume::detail {
 
-SourceFile::SourceFile(const std::filesystem::path& file, Progress* progress)
-    : std::istream(nullptr), buffer_(file, progress) {
+namespace {
+
+class DiskFile final : public ByteSource {
+ public:
+  explicit DiskFile(const std::filesystem::path& file) {
+    file_.pubsetbuf(nullptr, 0);
+    errno = 0;
+    if (file_.open(file, std::ios::in | std::ios::binary) == nullptr)
+      throw std::runtime_error(errno != 0 ? std::strerror(errno) : "cannot be opened");
+    size_ = std::filesystem::file_size(file);
+  }
+
+  [[nodiscard]] std::uint64_t size() const override { return size_; }
+  std::size_t read(std::uint64_t position, char* to, std::size_t count) override {
+    const auto target = static_cast<std::streamoff>(position);
+    if (target != at_ && file_.pubseekpos(target, std::ios::in) != target)
+      throw std::runtime_error("cannot be read at position " + std::to_string(position));
+    const std::streamsize got = file_.sgetn(to, static_cast<std::streamsize>(count));
+    at_ = target + got;
+    return static_cast<std::size_t>(got);
+  }
+
+ private:
+  std::filebuf file_;
+  std::uint64_t size_ = 0;
+  std::streamoff at_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ByteSource> open_file(const std::filesystem::path& file) { return std::make_unique<DiskFile>(file); }
+
+SourceFile::SourceFile(std::unique_ptr<ByteSource> content, Progress* progress)
+    : std::istream(nullptr), buffer_(std::move(content), progress) {
   rdbuf(&buffer_);
   exceptions(std::ios::failbit | std::ios::badbit);
 }
 
-SourceFile::Buffer::Buffer(const std::filesystem::path& file, Progress* progress)
-    : bytes_(std::size_t{256} << 10U), progress_(progress) {
-  file_.pubsetbuf(nullptr, 0);
-  if (file_.open(file, std::ios::in | std::ios::binary) == nullptr) throw std::runtime_error("cannot be opened");
-  size_ = static_cast<std::int64_t>(std::filesystem::file_size(file));
-}
+SourceFile::Buffer::Buffer(std::unique_ptr<ByteSource> content, Progress* progress)
+    : content_(std::move(content)),
+      bytes_(std::size_t{256} << 10U),
+      size_(static_cast<std::int64_t>(content_->size())),
+      progress_(progress) {}
 
 SourceFile::Buffer::int_type SourceFile::Buffer::underflow() {
   if (!held_) check(progress_);
-  const std::streamsize got = file_.sgetn(bytes_.data(), static_cast<std::streamsize>(next_read_));
+  const std::size_t got = content_->read(static_cast<std::uint64_t>(end_), bytes_.data(), next_read_);
   next_read_ = std::min(2 * next_read_, bytes_.size());
   setg(bytes_.data(), bytes_.data(), bytes_.data() + got);
-  end_ += got;
+  end_ += static_cast<std::int64_t>(got);
   if (got == 0) return traits_type::eof();
-  if (!held_ && part_) part_->add(static_cast<std::uint64_t>(got));
+  if (!held_ && part_) part_->add(got);
   return traits_type::to_int_type(*gptr());
 }
 
@@ -55,7 +91,6 @@ SourceFile::Buffer::pos_type SourceFile::Buffer::seekpos(pos_type position, std:
   if (from_end >= 0 && from_end <= egptr() - eback()) {
     setg(eback(), egptr() - from_end, egptr());
   } else {
-    if (file_.pubseekpos(target, std::ios::in) != position) return {off_type{-1}};
     setg(nullptr, nullptr, nullptr);
     end_ = target;
     next_read_ = min_read;

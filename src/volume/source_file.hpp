@@ -4,23 +4,27 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <istream>
+#include <memory>
 #include <optional>
 #include <streambuf>
 #include <vector>
 
+#include "base/byte_source.hpp"
 #include "base/progress_part.hpp"
 
 namespace cumulet::volume::detail {
 
-/// A file stream that reports read progress. On cancellation it throws Error(cancelled) from the read, through the
-/// library that is reading. Seeks within its buffer are free: OpenVDB seeks at every leaf. After other seeks it reads
-/// little ahead, and more with each read: grid headers are far from each other, and shared storage is slow per byte.
+/// Opens a file on disk. Throws std::runtime_error with the cause.
+std::unique_ptr<ByteSource> open_file(const std::filesystem::path& file);
+
+/// A stream over a file's content that reports read progress. On cancellation it throws Error(cancelled) from the read,
+/// through the library that is reading. Seeks within its buffer are free: OpenVDB seeks at every leaf. After other
+/// seeks it reads little ahead, and more with each read: grid headers are far from each other, and shared storage is
+/// slow per byte.
 class SourceFile final : public std::istream {
  public:
-  /// Throws std::runtime_error if the file cannot be opened.
-  SourceFile(const std::filesystem::path& file, Progress* progress);
+  SourceFile(std::unique_ptr<ByteSource> content, Progress* progress);
 
   [[nodiscard]] std::int64_t size() const { return buffer_.size(); }
   /// Starts a progress range: bytes read from now on, and amounts added to the returned part, count towards `total`.
@@ -31,7 +35,7 @@ class SourceFile final : public std::istream {
  private:
   class Buffer final : public std::streambuf {
    public:
-    Buffer(const std::filesystem::path& file, Progress* progress);
+    Buffer(std::unique_ptr<ByteSource> content, Progress* progress);
     [[nodiscard]] std::int64_t size() const { return size_; }
     ProgressPart& begin(double from, double to, std::uint64_t total) {
       part_.emplace(progress_, from, to, total);
@@ -51,11 +55,11 @@ class SourceFile final : public std::istream {
 
     static constexpr std::size_t min_read = std::size_t{16} << 10U;
 
-    std::filebuf file_;
+    std::unique_ptr<ByteSource> content_;
     std::vector<char> bytes_;
     std::size_t next_read_ = min_read;
-    std::int64_t size_ = 0;
-    std::int64_t end_ = 0;  ///< file position of the buffer's end, and of file_
+    std::int64_t size_;
+    std::int64_t end_ = 0;  ///< position of the buffer's end within the content
     Progress* progress_;
     std::optional<ProgressPart> part_;
     bool held_ = false;

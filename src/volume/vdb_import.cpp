@@ -134,7 +134,8 @@ std::vector<char> understood_header(SourceFile& stream) {
 /// file's size, and the stream throws at its end.
 class VdbReader final : public Reader, private openvdb::io::Archive {
  public:
-  VdbReader(const std::filesystem::path& file, Progress* progress) : stream_(file, progress), size_(stream_.size()) {
+  VdbReader(std::unique_ptr<ByteSource> content, Progress* progress)
+      : stream_(std::move(content), progress), size_(stream_.size()) {
     initialize_readers();
     try {
       read_directory();
@@ -395,8 +396,8 @@ class VdbReader final : public Reader, private openvdb::io::Archive {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_vdb(const std::filesystem::path& file, Progress* progress) {
-  return std::make_unique<VdbReader>(file, progress);
+std::unique_ptr<Reader> open_vdb(std::unique_ptr<ByteSource> content, Progress* progress) {
+  return std::make_unique<VdbReader>(std::move(content), progress);
 }
 
 }  // namespace detail

@@ -3,7 +3,7 @@
 
 namespace cumulet::volume {
 
-std::unique_ptr<detail::Reader> detail::open_nanovdb(const std::filesystem::path& /*file*/, Progress* /*progress*/) {
+std::unique_ptr<detail::Reader> detail::open_nanovdb(std::unique_ptr<ByteSource> /*content*/, Progress* /*progress*/) {
   fail(missing_feature("is a NanoVDB file", "CUMULET_NANOVDB"));
 }
 

@@ -5,7 +5,7 @@ namespace cumulet::volume {
 
 void initialize_readers() {}
 
-std::unique_ptr<detail::Reader> detail::open_vdb(const std::filesystem::path& /*file*/, Progress* /*progress*/) {
+std::unique_ptr<detail::Reader> detail::open_vdb(std::unique_ptr<ByteSource> /*content*/, Progress* /*progress*/) {
   fail(missing_feature("is an OpenVDB file", "CUMULET_OPENVDB"));
 }
 

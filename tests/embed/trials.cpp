@@ -301,6 +301,7 @@ struct Caller {
     if (status != expected) wrong.push_back(name + ": " + std::to_string(status));
   }
   void call_all();
+  void call_others();
   static void on_update(void* user) { static_cast<Caller*>(user)->once(); }
   static void on_log(void* user, cumulet_log_level, const char*) { static_cast<Caller*>(user)->once(); }
 
@@ -314,7 +315,25 @@ struct Caller {
 
 #define CALL(function, ...) answer(#function, function(__VA_ARGS__))
 
+void Caller::call_others() {
+  const std::array<std::uint8_t, 4> bytes{};
+  const auto stream = make_desc<cumulet_stream_desc>();
+  const auto file = make_desc<cumulet_volume_file_desc>();
+  cumulet_volume* new_volume = nullptr;
+  cumulet_environment* new_environment = nullptr;
+  CALL(cumulet_volume_open, "none.vdb", nullptr, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_open_file, &file, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_from_memory, bytes.data(), bytes.size(), &file, &new_volume, nullptr, 0);
+  CALL(cumulet_volume_from_stream, &stream, &file, &new_volume, nullptr, 0);
+  CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
+  CALL(cumulet_environment_from_memory, bytes.data(), bytes.size(), nullptr, &new_environment, nullptr, 0);
+  CALL(cumulet_environment_from_stream, &stream, nullptr, &new_environment, nullptr, 0);
+  for (cumulet_viewer* v : {viewer, other}) CALL(cumulet_set_display_lut, v, nullptr);
+  if (new_volume != nullptr || new_environment != nullptr) wrong.push_back("a reader's handle");
+}
+
 void Caller::call_all() {
+  call_others();
   std::array<double, 16> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   std::array<double, 3> low{}, high{1.0, 1.0, 1.0};
   std::array<float, 4> one{};
@@ -437,10 +456,8 @@ void Caller::call_all() {
 
   CALL(cumulet_create, &create, &new_viewer, nullptr, 0);
   CALL(cumulet_shader_cache_create, &programs, &new_programs, nullptr, 0);
-  CALL(cumulet_volume_open, "none.vdb", nullptr, &new_volume, nullptr, 0);
   CALL(cumulet_volume_from_dense, &dense, &new_volume, nullptr, 0);
   CALL(cumulet_volume_from_sparse, &sparse, &new_volume, nullptr, 0);
-  CALL(cumulet_volume_open_file, &volume_file, &new_volume, nullptr, 0);
   CALL(cumulet_volume_suggest_density_scale, volume, &number);
   CALL(cumulet_inspect_volume_file, "none.vdb", &new_inspection, nullptr, 0);
   CALL(cumulet_inspection_get_file, new_inspection, &file_info);
@@ -450,7 +467,6 @@ void Caller::call_all() {
   CALL(cumulet_volume_get_histogram, volume, CUMULET_RAMP_DENSITY, &values_info);
   CALL(
       cumulet_list_grids, "none.vdb", [](void*, const char*, const char*, const char*) {}, nullptr, nullptr, 0);
-  CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
   CALL(cumulet_environment_from_pixels, &environment, &new_environment, nullptr, 0);
   CALL(cumulet_environment_get_info, new_environment, &environment_info);
   CALL(cumulet_environment_get_pixels, new_environment, 1, 1, rgb.data(), rgb.size());

@@ -31,6 +31,7 @@ for deb in "${debs[@]}"; do
   rm -r "$work/unpacked"
 done
 for file in usr/bin/cumulet-{render,merge,farm,demo,scene} usr/share/man/man1/cumulet-render.1.gz \
+  usr/share/thumbnailers/cumulet.thumbnailer usr/share/metainfo/org.cumulet.cumulet.metainfo.xml \
   usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet,python3-cumulet}/copyright \
   usr/share/doc/cumulet/{README,CHANGELOG,CONTRIBUTING}.md; do
   [ -s "$root/$file" ] || fail "no package has $file"
@@ -82,6 +83,8 @@ in_root "$root" /usr/bin/cumulet-scene --only cumulus --voxels 20000 /tmp/scene 
 in_root "$root" /usr/bin/cumulet-render --volume /tmp/scene/cumulus.vdb --size 32x32 --spp 1 -o /tmp/egl.png ||
   fail "cumulet-render made no picture"
 [ -s "$root/tmp/egl.png" ] || fail "cumulet-render wrote no picture"
+in_root "$root" /usr/bin/cumulet-render --thumbnail 32 -o /tmp/thumbnail /tmp/scene/cumulus.vdb || fail "no thumbnail"
+[ -s "$root/tmp/thumbnail" ] || fail "cumulet-render wrote no thumbnail"
 said=$(in_root "$root" /usr/bin/cumulet-demo --version) || fail "cumulet-demo did not start"
 [ "$said" = "cumulet-demo $version" ] || fail "cumulet-demo is '$said'"
 

@@ -8,7 +8,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 fail() { echo "install_test: $*" >&2; exit 1; }
-for tool in groff zsh desktop-file-validate update-mime-database gio; do
+for tool in groff zsh desktop-file-validate appstreamcli update-mime-database gio; do
   command -v "$tool" >/dev/null || { echo "install_test: skipped: it needs $tool (scripts/packages.txt)"; exit 77; }
 done
 
@@ -116,4 +116,33 @@ expect application/x-nanovdb "$(type_of "$work/files/smoke.nvdb")" "type of smok
 expect application/x-nanovdb "$(type_of "$work/files/unnamed_nanovdb")" "type of a NanoVDB file without a name"
 for type in $(sed -n 's/^MimeType=//p' "$share/applications/cumulet-demo.desktop" | tr ';' ' '); do
   [ -s "$share/mime/$type.xml" ] || fail "cumulet-demo.desktop takes '$type', which nobody defines"
+done
+
+# --- the thumbnailer and the AppStream file ---------------------------------------------------------------------------
+thumbnailer=$share/thumbnailers/cumulet.thumbnailer
+[ "$(head -n 1 "$thumbnailer")" = "[Thumbnailer Entry]" ] || fail "cumulet.thumbnailer has another group"
+if grep -vE '^(TryExec|Exec|MimeType)=.+$|^\[Thumbnailer Entry\]$' "$thumbnailer"; then fail "cumulet.thumbnailer has unknown lines"; fi
+run=$(sed -n 's/^TryExec=//p' "$thumbnailer")
+[ -x "$tree/bin/$run" ] || fail "no program '$run'"
+read -ra command <<<"$(sed -n 's/^Exec=//p' "$thumbnailer")"
+[ "${command[0]}" = "$run" ] || fail "cumulet.thumbnailer tries '$run' and runs '${command[0]}'"
+for type in $(sed -n 's/^MimeType=//p' "$thumbnailer" | tr ';' ' '); do
+  [ -s "$share/mime/$type.xml" ] || fail "cumulet.thumbnailer takes '$type', which nobody defines"
+done
+"$tree/bin/cumulet-scene" --only cumulus --voxels 20000 "$work/scene" >/dev/null
+# As a file manager runs it: the name of the output has no ending.
+command=("${command[@]/#%s/48}")
+command=("${command[@]/#%o/$work/thumbnail}")
+command=("${command[@]/#%i/$work/scene/cumulus.vdb}")
+XDG_CACHE_HOME=$work/cache "$tree/bin/${command[0]}" "${command[@]:1}" || fail "the thumbnailer fails"
+size=$(head -c 24 "$work/thumbnail" | tail -c 8 | od -An -tx1 | tr -d ' ')
+expect 0000003000000030 "$size" "width and height of the thumbnail"
+metainfo=$share/metainfo/org.cumulet.cumulet.metainfo.xml
+appstreamcli validate --no-net "$metainfo" || fail "the AppStream file is not valid"
+launched=$(sed -n 's/.*<launchable type="desktop-id">\(.*\)<.*/\1/p' "$metainfo")
+[ -s "$share/applications/$launched" ] || fail "no desktop file '$launched'"
+version=$("$tree/bin/cumulet-render" --version)
+grep -q "<release version=\"${version##* }\"" "$metainfo" || fail "the AppStream file lacks $version"
+for type in $(sed -n 's/.*<mediatype>\(.*\)<.*/\1/p' "$metainfo" | tr '\n' ' '); do
+  grep -q "$type;" "$share/applications/cumulet-demo.desktop" || fail "cumulet-demo.desktop lacks '$type'"
 done

@@ -25,9 +25,9 @@ std::string error_of(const std::function<void()>& call) {
 
 TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
   Budget budget({}, nullptr);
-  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_vdb("cloud.vdb", nullptr); }),
+  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_vdb(nullptr, nullptr); }),
             "is an OpenVDB file, which this build of Cumulet does not read (CUMULET_OPENVDB=OFF)");
-  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_nanovdb("cloud.nvdb", nullptr); }),
+  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_nanovdb(nullptr, nullptr); }),
             "is a NanoVDB file, which this build of Cumulet does not read (CUMULET_NANOVDB=OFF)");
   EXPECT_EQ(error_of([&] { (void)decode_draco({}, nullptr, "mesh 0", budget); }),
             "mesh 0 is compressed by Draco, which this build of Cumulet does not read (CUMULET_DRACO=OFF)");

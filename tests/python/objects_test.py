@@ -2,6 +2,7 @@
 
 import array
 import gc
+import io
 import os
 import pathlib
 import subprocess
@@ -89,6 +90,27 @@ class Arrays(unittest.TestCase):
         self.assertEqual(surfaces.get_info().triangles, 1)
         self.assertIn("3 for each of 3", self.line_of(ValueError, cumulet.Surfaces.from_triangles,
                                                       meshes=[{"positions": positions, "normals": one}]))
+
+    def test_volumes_and_environments_come_from_bytes_and_file_objects(self):
+        header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"
+        content = header + bytes([128, 64, 32, 129]) * 2
+        for sky in (cumulet.Environment.from_bytes(content, "pak:sky"),
+                    cumulet.Environment.from_stream(io.BytesIO(content), "pak:sky")):
+            info = sky.get_info()
+            self.assertEqual((info.name, info.width, info.height), ("pak:sky", 2, 1))
+        for line, function, *arguments in (
+                ("pak:cloud: is not a VDB, NanoVDB or NRRD file", cumulet.Volume.from_bytes, content, "pak:cloud"),
+                ("pak:cloud: is not a VDB, NanoVDB or NRRD file", cumulet.Volume.from_stream, io.BytesIO(content), "pak:cloud"),
+                ("stream: is empty", cumulet.Volume.from_stream, io.BytesIO()),
+                ("memory: truncated Radiance file", cumulet.Environment.from_bytes, header[:20])):
+            self.assertEqual(self.line_of(cumulet.Error, function, *arguments), line)
+        self.assertIn("no field 'grid'", self.line_of(TypeError, cumulet.Volume.from_stream, io.BytesIO(), grid="a"))
+
+        class Broken(io.BytesIO):
+            def read(self, size=-1):
+                raise OSError("the archive is gone")
+
+        self.assertEqual(self.line_of(OSError, cumulet.Volume.from_stream, Broken(content)), "the archive is gone")
 
     def test_other_arrays(self):
         pixels = memoryview(array.array("f", [0.5] * 24)).cast("B").cast("f", (2, 4, 3))

@@ -74,6 +74,16 @@ class Pictures(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, r"picture.gif: pictures are saved as .png or .exr$"):
                 self.picture.save(path.with_suffix(".gif"))
 
+    def test_a_display_lut(self):
+        shown = bytes(self.picture.display)
+        half = memoryview(array.array("f", [0.5] * 24)).cast("B").cast("f", (2, 2, 2, 3))
+        self.viewer.set_display_lut(half, shaper="log2", domain=(-8, 8))
+        self.assertEqual(bytes(self.viewer.encode_display(self.picture.linear))[:3], b"\x80\x80\x80")
+        with self.assertRaisesRegex(ValueError, "its shape is"):
+            self.viewer.set_display_lut(box())
+        self.viewer.set_display_lut(None)
+        self.assertEqual(bytes(self.viewer.encode_display(self.picture.linear)), shown)
+
     def test_readback(self):
         beauty = self.viewer.read_aov("beauty")
         depth = self.viewer.read_aov("volume_depth")

@@ -532,6 +532,21 @@ TEST_F(CppViewer, UsesASharedCamera) {
   EXPECT_NEAR(viewer.get_camera()->get()->target[0], 8.0, 1e-6);
 }
 
+TEST(CppDisplayLut, IsSetAndRemoved) {
+  Viewer viewer = Viewer::create({}).value();
+  const std::vector<float> values(24, 0.5F);
+  viewer.set_display_lut({.values = values, .size = 2, .shaper = LutShaper::log2, .domain_min = -8, .domain_max = 8})
+      .value();
+  const std::array<float, 4> linear{0.1F, 0.2F, 0.3F, 1.0F};
+  std::array<std::uint8_t, 4> bytes{};
+  viewer.encode_display(linear, bytes).value();
+  EXPECT_EQ(bytes, (std::array<std::uint8_t, 4>{128, 128, 128, 255}));
+  viewer.remove_display_lut().value();
+  viewer.encode_display(linear, bytes).value();
+  EXPECT_LT(bytes[0], bytes[2]);
+  EXPECT_EQ(viewer.set_display_lut({.size = 2}).error().status, StatusCode::invalid_argument);
+}
+
 TEST(CppSurfaces, FromFilesAndMemory) {
   const std::string json = R"({"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],

@@ -260,6 +260,35 @@ TEST(Options, ModelFlagsNeedAModel) {
   }
 }
 
+TEST(Options, AThumbnailHasItsOwnDefaults) {
+  const RenderOptions options = parse({"--thumbnail", "128", "-o", "/tmp/.thumbnail.X7a"});
+  EXPECT_EQ(options.scene.width, 128U);
+  EXPECT_EQ(options.scene.height, 128U);
+  EXPECT_EQ(options.format, OutputFormat::png);
+  EXPECT_EQ(options.denoise, Denoise::fast);
+  EXPECT_EQ(options.scene.sampling.samples, 16U);
+  ASSERT_TRUE(options.time_limit);
+  EXPECT_LT(*options.time_limit, 3.0);
+  EXPECT_NE(options.scene.grid.max_cells, 0U);
+  const RenderOptions mine = parse({"--thumbnail", "64", "--spp", "3", "--denoise", "off", "--shader-cache", "here"});
+  EXPECT_EQ(mine.scene.sampling.samples, 3U);
+  EXPECT_EQ(mine.denoise, Denoise::off);
+  EXPECT_EQ(mine.shader_cache, "here");
+  EXPECT_EQ(usage_error(with({"--thumbnail", "64", "--size", "8x8"})), "--thumbnail cannot be combined with --size");
+  EXPECT_NE(usage_error(with({"--thumbnail", "8"})), "");
+  EXPECT_EQ(usage_error(with({"-o", "/tmp/.thumbnail.X7a"})),
+            "--output: '/tmp/.thumbnail.X7a' does not end in .png, .exr or .pfm");
+}
+
+TEST(Options, ALutIsForPngs) {
+  const RenderOptions options = parse({"--lut", "look.cube"});
+  EXPECT_EQ(options.lut, "look.cube");
+  EXPECT_EQ(options.lut_shaper, CUMULET_LUT_SHAPER_SRGB);
+  EXPECT_EQ(parse({"--lut", "look.cube", "--lut-input", "log2"}).lut_shaper, CUMULET_LUT_SHAPER_LOG2);
+  EXPECT_EQ(usage_error(with({"--lut", "look.cube", "-o", "a.exr"})), "--lut needs a .png output");
+  EXPECT_EQ(usage_error(with({"--lut-input", "linear"})), "--lut-input needs --lut");
+}
+
 TEST(Options, PartialImageNeedsASampleRangeAndExr) {
   const RenderOptions part = parse({"-o", "a.exr", "--spp", "32", "--first-sample", "96"});
   EXPECT_EQ(part.scene.sampling.first_sample, 96u);

@@ -497,7 +497,8 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
  */
 
 /**
- * Reads the density of a .vdb or .nvdb file, and the other fields that are found by name (docs/grids.md).
+ * Reads the density of a .vdb or .nvdb file, and the other fields that are found by name (docs/grids.md). All functions
+ * that read volumes also read dense arrays: .nrrd and .vti files, and .raw files with a JSON description beside them.
  *
  * Without a name, the density is the grid called "density", or else "smoke" or "soot". A file that has none of these,
  * but a temperature or a flame, has no density: it shows only fire. In a file without any of them, the first scalar fog
@@ -583,6 +584,65 @@ typedef struct cumulet_volume_file_desc {
  */
 CUMULET_API cumulet_status cumulet_volume_open_file(const cumulet_volume_file_desc* desc, cumulet_volume** out,
                                                     char* error, size_t error_size);
+
+/**
+ * Reads a part of a host's stream.
+ *
+ * Threads: called on any thread, one call at a time, until the function that received the stream returns. Must not call
+ * the library.
+ *
+ * @param user     cumulet_stream_desc.read_user.
+ * @param position Position of the first byte, less than cumulet_stream_desc.size. Positions do not only increase.
+ * @param bytes    Receives the bytes.
+ * @param size     Bytes to read; position + size is at most cumulet_stream_desc.size.
+ * @return Bytes read. A number other than size is an error, and ends the load.
+ */
+typedef uint64_t (*cumulet_read_fn)(void* user, uint64_t position, void* bytes, uint64_t size);
+
+/** The content of a file that only the host can read, for example an entry of a pak file. */
+typedef struct cumulet_stream_desc {
+  size_t struct_size;
+  uint64_t size; /**< Bytes of the content. */
+  cumulet_read_fn read;
+  void* read_user; /**< First argument of read. */
+} cumulet_stream_desc;
+
+/**
+ * Reads the bytes of a .vdb or .nvdb file, which are recognized by their content.
+ *
+ * Threads: any thread; returns when all is read. No GL.
+ *
+ * @param bytes      The file's content; not used after the call returns.
+ * @param size       Bytes at bytes.
+ * @param desc       The grids and the transform. The file at path is not read: messages use path as the name of the
+ *                   bytes. Without a path they use "memory". NULL: all fields have their defaults.
+ * @param out        Receives the volume, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for a transform as in cumulet_volume_open_file; or
+ *         CUMULET_ERROR_FILE.
+ */
+CUMULET_API cumulet_status cumulet_volume_from_memory(const void* bytes, size_t size,
+                                                      const cumulet_volume_file_desc* desc, cumulet_volume** out,
+                                                      char* error, size_t error_size);
+
+/**
+ * Reads a .vdb or .nvdb file through a callback. Only the parts with the chosen grids are read.
+ *
+ * Threads: any thread; returns when all is read. No GL.
+ *
+ * @param stream     The file's content.
+ * @param desc       The grids and the transform, as in cumulet_volume_from_memory. Without a path, messages use
+ *                   "stream". NULL: all fields have their defaults.
+ * @param out        Receives the volume, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT for a transform as in cumulet_volume_open_file; or
+ *         CUMULET_ERROR_FILE, also if the stream fails.
+ */
+CUMULET_API cumulet_status cumulet_volume_from_stream(const cumulet_stream_desc* stream,
+                                                      const cumulet_volume_file_desc* desc, cumulet_volume** out,
+                                                      char* error, size_t error_size);
 
 /** Voxels in a dense box. Active voxels are those that are not zero. */
 typedef struct cumulet_dense_desc {
@@ -1458,6 +1518,37 @@ CUMULET_API cumulet_status cumulet_surfaces_get_variant(const cumulet_surfaces* 
  */
 CUMULET_API cumulet_status cumulet_environment_open(const char* path, cumulet_environment** out, char* error,
                                                     size_t error_size);
+
+/**
+ * Reads the bytes of a Radiance or OpenEXR file, as cumulet_environment_open reads a file.
+ *
+ * Threads: any thread; returns when it is ready. No GL.
+ *
+ * @param bytes      The file's content; not used after the call returns.
+ * @param size       Bytes at bytes.
+ * @param name       Used in messages in place of the path. NULL: "memory".
+ * @param out        Receives the environment, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or CUMULET_ERROR_FILE.
+ */
+CUMULET_API cumulet_status cumulet_environment_from_memory(const void* bytes, size_t size, const char* name,
+                                                           cumulet_environment** out, char* error, size_t error_size);
+
+/**
+ * Reads a Radiance or OpenEXR file through a callback, in one call.
+ *
+ * Threads: any thread; returns when it is ready. No GL.
+ *
+ * @param stream     The file's content.
+ * @param name       Used in messages in place of the path. NULL: "stream".
+ * @param out        Receives the environment, which the caller releases; NULL on failure.
+ * @param error      Receives the cause in one line, zero-terminated and cut to fit; may be NULL.
+ * @param error_size Bytes at error.
+ * @return CUMULET_OK, CUMULET_ERROR_INVALID_ARGUMENT, or CUMULET_ERROR_FILE, also if the stream fails.
+ */
+CUMULET_API cumulet_status cumulet_environment_from_stream(const cumulet_stream_desc* stream, const char* name,
+                                                           cumulet_environment** out, char* error, size_t error_size);
 
 /** The host's own pixels. */
 typedef struct cumulet_environment_desc {
@@ -2941,6 +3032,51 @@ CUMULET_API cumulet_status cumulet_region_pixels(const float region[4], uint32_t
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
 CUMULET_API cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc);
+
+/** The curve before the lattice of a display LUT. It maps exposed linear Rec. 709 radiance. */
+typedef enum cumulet_lut_shaper {
+  CUMULET_LUT_SHAPER_LINEAR = 0, /**< Radiance itself. */
+  CUMULET_LUT_SHAPER_LOG2 = 1,   /**< log2 of radiance, as of OpenColorIO's allocation lg2. 0 is below each domain. */
+  CUMULET_LUT_SHAPER_SRGB = 2    /**< The sRGB curve. */
+} cumulet_lut_shaper;
+
+/** A display transform of the host: a shaper per channel, and a lattice of colors, for example by OpenColorIO. */
+typedef struct cumulet_display_lut_desc {
+  size_t struct_size;
+  /**
+   * Color of each lattice point, 3 floats, red fastest, then green, then blue. Encoded as for an sRGB display;
+   * interpolated (tetrahedral), then clamped to [0, 1].
+   */
+  const float* values;
+  uint64_t value_count; /**< 3 x size^3. */
+  uint32_t size;        /**< Points per axis, 2 to 65; mostly 17, 33 or 65. */
+  cumulet_lut_shaper shaper;
+  /**
+   * Shaped values at the first and at the last point of an axis, -1e6 to 1e6; values beyond are clamped to them. Both
+   * 0: 0 and 1.
+   */
+  float domain_min;
+  float domain_max;
+} cumulet_display_lut_desc;
+
+/**
+ * Sets or removes a display LUT, which replaces tone_map of cumulet_display_desc and the sRGB encoding in all displayed
+ * images: frames, cumulet_read_display and cumulet_encode_display. exposure_stops is applied before. A change does not
+ * restart accumulation.
+ *
+ * - CUMULET_COLOR_LINEAR and CUMULET_COLOR_SRGB_FRAMEBUFFER get its colors decoded by the sRGB curve.
+ * - CUMULET_COLOR_HDR and debug views do not use it.
+ * - With a transparent background, a pixel's color is that of its radiance over black. Black must stay black, or
+ *   transparent pixels get color.
+ * - It takes 16 bytes per lattice point of GL memory.
+ *
+ * Threads: one call per viewer at a time. No GL.
+ *
+ * @param viewer The viewer.
+ * @param desc   The LUT, which is copied. NULL: none.
+ * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
+ */
+CUMULET_API cumulet_status cumulet_set_display_lut(cumulet_viewer* viewer, const cumulet_display_lut_desc* desc);
 
 /** @} */
 

@@ -262,6 +262,19 @@ template <class Desc>
   return desc;
 }
 
+/// Returns the stream of read(position, std::span<std::byte>), which must outlive it.
+template <class Read>
+[[nodiscard]] cumulet_stream_desc stream_of(std::uint64_t size, Read& read) noexcept {
+  const auto call = [](void* user, std::uint64_t position, void* to, std::uint64_t count) noexcept -> std::uint64_t {
+    return (*static_cast<Read*>(user))(
+        position, std::span<std::byte>(static_cast<std::byte*>(to), static_cast<std::size_t>(count)));
+  };
+  return {.struct_size = sizeof(cumulet_stream_desc),
+          .size = size,
+          .read = call,
+          .read_user = const_cast<void*>(static_cast<const void*>(std::addressof(read)))};
+}
+
 [[nodiscard]] inline const char* or_null(const std::string& text) noexcept {
   return text.empty() ? nullptr : text.c_str();
 }
@@ -346,6 +359,24 @@ class Volume {
     const cumulet_volume_file_desc c = desc;
     return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
       return cumulet_volume_open_file(&c, out, error, size);
+    });
+  }
+  /// Reads the bytes of a file. desc.path: name in messages; NULL: "memory".
+  [[nodiscard]] static Result<Volume> from_memory(std::span<const std::byte> bytes,
+                                                  const VolumeFileDesc& desc = {}) noexcept {
+    const cumulet_volume_file_desc c = desc;
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_memory(bytes.data(), bytes.size(), &c, out, error, size);
+    });
+  }
+  /// Reads a file of `file_size` bytes by read(position, std::span<std::byte>), which returns the number of bytes read.
+  template <class Read>
+  [[nodiscard]] static Result<Volume> from_stream(std::uint64_t file_size, Read&& read,
+                                                  const VolumeFileDesc& desc = {}) noexcept {
+    const cumulet_volume_file_desc c = desc;
+    const cumulet_stream_desc stream = detail::stream_of(file_size, read);
+    return detail::made<Volume>([&](cumulet_volume** out, char* error, std::size_t size) {
+      return cumulet_volume_from_stream(&stream, &c, out, error, size);
     });
   }
   [[nodiscard]] static Result<Volume> from_dense(const DenseDesc& desc) noexcept {
@@ -587,6 +618,27 @@ class Surfaces {
   cumulet_surfaces* handle_ = nullptr;
 };
 
+// ---- Display LUTs
+// ----------------------------------------------------------------------------------------------------
+
+struct DisplayLutDesc {
+  std::span<const float> values{};  ///< 3 per point, red fastest
+  std::uint32_t size = 0;         ///< points per axis
+  LutShaper shaper{};
+  float domain_min = 0.0F;
+  float domain_max = 0.0F;
+
+  operator cumulet_display_lut_desc() const noexcept {
+    return {.struct_size = sizeof(cumulet_display_lut_desc),
+            .values = values.data(),
+            .value_count = values.size(),
+            .size = size,
+            .shaper = static_cast<cumulet_lut_shaper>(shaper),
+            .domain_min = domain_min,
+            .domain_max = domain_max};
+  }
+};
+
 // ---- Environments ---------------------------------------------------------------------------------------------------
 
 struct EnvironmentDesc {
@@ -611,6 +663,22 @@ class Environment {
   [[nodiscard]] static Result<Environment> open(const std::string& path) noexcept {
     return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
       return cumulet_environment_open(path.c_str(), out, error, size);
+    });
+  }
+  /// Reads the bytes of a file. name: in messages; NULL: "memory".
+  [[nodiscard]] static Result<Environment> from_memory(std::span<const std::byte> bytes,
+                                                       const char* name = nullptr) noexcept {
+    return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
+      return cumulet_environment_from_memory(bytes.data(), bytes.size(), name, out, error, size);
+    });
+  }
+  /// Reads a file of `file_size` bytes by read(position, std::span<std::byte>), which returns the number of bytes read.
+  template <class Read>
+  [[nodiscard]] static Result<Environment> from_stream(std::uint64_t file_size, Read&& read,
+                                                       const char* name = nullptr) noexcept {
+    const cumulet_stream_desc stream = detail::stream_of(file_size, read);
+    return detail::made<Environment>([&](cumulet_environment** out, char* error, std::size_t size) {
+      return cumulet_environment_from_stream(&stream, name, out, error, size);
     });
   }
   [[nodiscard]] static Result<Environment> from_pixels(const EnvironmentDesc& desc) noexcept {
@@ -1481,6 +1549,11 @@ class Viewer {
   [[nodiscard]] Result<> set_ground(const GroundDesc& desc) noexcept { return set(cumulet_set_ground, desc); }
   [[nodiscard]] Result<> set_sampling(const SamplingDesc& desc) noexcept { return set(cumulet_set_sampling, desc); }
   [[nodiscard]] Result<> set_display(const DisplayDesc& desc) noexcept { return set(cumulet_set_display, desc); }
+  [[nodiscard]] Result<> set_display_lut(const DisplayLutDesc& desc) noexcept {
+    const cumulet_display_lut_desc c = desc;
+    return result(cumulet_set_display_lut(handle(), &c));
+  }
+  [[nodiscard]] Result<> remove_display_lut() noexcept { return result(cumulet_set_display_lut(handle(), nullptr)); }
 
   [[nodiscard]] Result<> set_camera(const Camera& camera) noexcept {
     return result(cumulet_set_camera(handle(), camera.handle()));

@@ -1,0 +1,185 @@
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <utility>
+
+#include "volume/array_file.hpp"
+
+namespace cumulet::volume::detail {
+
+namespace {
+
+constexpr std::size_t max_header = std::size_t{4} << 20U;
+constexpr std::string_view blanks = " \t\r\n";
+
+/// A tag of XML, without its angle brackets.
+class Tag {
+ public:
+  explicit Tag(std::string_view text) : text_(text) {}
+
+  [[nodiscard]] std::string_view name() const { return text_.substr(0, text_.find_first_of(" \t\r\n/", 1)); }
+  /// Returns the value of an attribute; nullopt if there is none.
+  [[nodiscard]] std::optional<std::string_view> find(std::string_view attribute) const {
+    for (std::size_t at = text_.find(attribute); at != std::string_view::npos; at = text_.find(attribute, at + 1)) {
+      std::string_view rest = text_.substr(at + attribute.size());
+      const bool begins = at > 0 && blanks.find(text_[at - 1]) != std::string_view::npos;
+      if (!begins || !rest.starts_with('=') || rest.size() < 2) continue;
+      const char quote = rest[1];
+      const std::size_t end = rest.find(quote, 2);
+      if ((quote != '"' && quote != '\'') || end == std::string_view::npos) continue;
+      return rest.substr(2, end - 2);
+    }
+    return std::nullopt;
+  }
+  /// Parses the numbers of an attribute. Throws if there are not so many.
+  template <class Number, std::size_t count>
+  [[nodiscard]] std::array<Number, count> numbers(std::string_view attribute) const {
+    const std::string_view whole = find(attribute).value_or("");
+    std::string_view text = whole;
+    std::array<Number, count> numbers{};
+    for (Number& number : numbers) {
+      text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      if (error != std::errc{}) fail("cannot read " + std::string(attribute) + "=\"" + one_line(whole, 60) + "\"");
+      text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    }
+    return numbers;
+  }
+
+ private:
+  std::string_view text_;
+};
+
+/// The XML part of a file.
+class VtiHeader {
+ public:
+  explicit VtiHeader(std::string text) : text_(std::move(text)) {
+    for (std::size_t at = text_.find('<'); at != std::string::npos && !has_data_; at = text_.find('<', at + 1)) {
+      const std::size_t end = text_.find('>', at);
+      if (end == std::string::npos) break;
+      take(Tag(std::string_view(text_).substr(at + 1, end - at - 1)), end + 1);
+    }
+    if (!has_file_) fail("is not a VTK file of image data");
+    if (fields_.empty()) fail("has no array of 1 or 3 components");
+    if (!has_data_) fail("has no appended data; only arrays that are appended as raw bytes are read");
+    for (ArrayField& field : fields_) field.first_byte += data_from_;
+  }
+
+  [[nodiscard]] std::vector<ArrayField> fields() const { return fields_; }
+
+ private:
+  void take(const Tag& tag, std::size_t after) {
+    const std::string_view name = tag.name();
+    if (name == "VTKFile") {
+      begin(tag);
+    } else if (name == "ImageData") {
+      place(tag);
+    } else if (name == "Piece") {
+      if (++pieces_ > 1) fail("has several pieces, which is not supported");
+      extent_ = tag.numbers<int, 6>("Extent");
+    } else if (name == "PointData" || name == "CellData") {
+      in_cells_ = name == "CellData";
+    } else if (name == "/PointData" || name == "/CellData") {
+      in_cells_.reset();
+    } else if (name == "DataArray" && in_cells_) {
+      add(tag);
+    } else if (name == "AppendedData") {
+      if (tag.find("encoding") != "raw") fail("has appended data that is not raw");
+      const std::size_t mark = text_.find('_', after);
+      if (mark == std::string::npos) fail(end_of_file);
+      data_from_ = mark + 1;
+      has_data_ = true;
+    }
+  }
+
+  void begin(const Tag& tag) {
+    if (tag.find("type") != "ImageData")
+      fail("is a VTK file of the type " + one_line(tag.find("type").value_or("?"), 60) + ", not ImageData");
+    has_file_ = true;
+    big_endian_ = tag.find("byte_order") == "BigEndian";
+    table_number_bytes_ = tag.find("header_type") == "UInt64" ? 8 : 4;
+    if (const auto compressor = tag.find("compressor")) {
+      if (*compressor != "vtkZLibDataCompressor")
+        fail("is compressed by " + one_line(*compressor, 60) + "; vtkZLibDataCompressor is supported");
+      compressed_ = true;
+    }
+  }
+
+  void place(const Tag& tag) {
+    if (tag.find("Origin")) origin_ = tag.numbers<double, 3>("Origin");
+    if (tag.find("Spacing")) spacing_ = tag.numbers<double, 3>("Spacing");
+    if (tag.find("Direction")) direction_ = tag.numbers<double, 9>("Direction");
+  }
+
+  void add(const Tag& tag) {
+    std::string type(tag.find("type").value_or(""));
+    std::ranges::transform(type, type.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string_view components = tag.find("NumberOfComponents").value_or("1");
+    const auto known = number_type_of(type);
+    if (!known || (components != "1" && components != "3")) return;
+    if (tag.find("format") != "appended")
+      fail("has an array in the format " + one_line(tag.find("format").value_or("ascii"), 60) +
+           "; only arrays that are appended as raw bytes are read");
+    ArrayField field;
+    field.name = one_line(tag.find("Name").value_or("density"));
+    field.type = *known;
+    field.components = components == "3" ? 3 : 1;
+    field.big_endian = big_endian_;
+    field.table_number_bytes = table_number_bytes_;
+    field.encoding = compressed_ ? ArrayEncoding::vtk_zlib : ArrayEncoding::raw;
+    field.first_byte = tag.numbers<std::uint64_t, 1>("offset")[0];
+    if (field.first_byte > max_offset) fail(end_of_file);
+    if (!compressed_) field.first_byte += table_number_bytes_;  // behind the number of bytes
+    set_lattice(field);
+    fields_.push_back(std::move(field));
+  }
+
+  void set_lattice(ArrayField& field) const {
+    glm::dvec3 first(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<std::size_t>(axis);
+      const std::int64_t steps = std::int64_t{extent_.at(2 * a + 1)} - extent_.at(2 * a);
+      const bool cells = in_cells_.value_or(false);
+      const std::int64_t side = steps + (cells ? 0 : 1);
+      field.size[axis] = static_cast<int>(std::clamp<std::int64_t>(side, 0, 1 << 30));
+      first[axis] = extent_.at(2 * a) + (cells ? 0.5 : 0.0);
+    }
+    for (int column = 0; column < 3; ++column) {
+      for (int row = 0; row < 3; ++row) {
+        const auto entry = static_cast<std::size_t>(3 * row + column);
+        field.index_to_world[column][row] = direction_.at(entry) * spacing_.at(static_cast<std::size_t>(column));
+      }
+    }
+    const glm::dvec3 origin(origin_[0], origin_[1], origin_[2]);
+    field.index_to_world[3] = glm::dvec4(origin + glm::dmat3(field.index_to_world) * first, 1.0);
+  }
+
+  static constexpr std::uint64_t max_offset = std::uint64_t{1} << 60U;
+
+  std::string text_;
+  bool has_file_ = false;
+  bool has_data_ = false;
+  bool big_endian_ = false;
+  bool compressed_ = false;
+  std::optional<bool> in_cells_;  // nullopt: in neither points nor cells
+  int pieces_ = 0;
+  std::size_t table_number_bytes_ = 4;
+  std::uint64_t data_from_ = 0;
+  std::array<double, 3> origin_{};
+  std::array<double, 3> spacing_{1.0, 1.0, 1.0};
+  std::array<double, 9> direction_{1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  std::array<int, 6> extent_{};
+  std::vector<ArrayField> fields_;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> open_vti(std::unique_ptr<ByteSource> content, Progress* progress) {
+  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(content->size(), max_header)), '\0');
+  text.resize(content->read(0, text.data(), text.size()));
+  const VtiHeader header(std::move(text));
+  return make_array_reader("VTK ImageData", header.fields(), {}, std::move(content), progress);
+}
+
+}  // namespace cumulet::volume::detail
