@@ -38,7 +38,7 @@ class ChannelFields {
   [[nodiscard]] std::span<const Statistics* const> statistics() const { return {fields_.data(), used_}; }
   /// Returns the values of all voxels of an octree cube if they are uniform, else nullopt.
   [[nodiscard]] std::optional<ChannelNumbers> even(const glm::ivec3& corner, int log2_size) const;
-  /// Writes the values of a brick's voxels: count() * volume::brick_voxels floats.
+  /// Writes count() values of each of the brick's voxels (Lattice::brick_voxels()).
   void fill(const glm::ivec3& corner, std::span<float> out) const;
   /// Writes the record of a cell above bricks: record_words() words.
   void put_record(const glm::vec3& v0, std::uint32_t shape, CellKind cells, std::span<std::uint32_t> record) const;

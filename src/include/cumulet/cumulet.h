@@ -2157,8 +2157,8 @@ typedef enum cumulet_build_device {
    * view-independent part once per volume and medium; a camera that moves then needs only the GPU passes.
    *
    * The CPU builds the grid instead, and the log has the reason, in these cases: the grid is larger than the driver's
-   * storage blocks; its build takes more GL memory than there is or than cumulet_limits_desc.gl_bytes allows; it moves
-   * while the shutter is open; or it has linear interpolation.
+   * storage blocks; its build takes more GL memory than there is or than cumulet_limits_desc.gl_bytes allows; or it
+   * moves while the shutter is open.
    */
   CUMULET_BUILD_GPU = 1
 } cumulet_build_device;
