@@ -503,7 +503,9 @@ TEST_P(MotionBlur, VolumeMovesByItsVelocityField) {
     EXPECT_NEAR(along_z(14.0, 31.5, 0.5), passing, 4.5 * sigma(passing)) << "less far in less time";
     EXPECT_NEAR(along_z(0.0, 31.5, 0.0), held, 4.5 * sigma(held)) << "the shutter is closed";
     EXPECT_NEAR(along_z(18.0, 31.5, 0.0), 1.0, 1e-6) << "the shutter is closed";
-    if (linear) EXPECT_NEAR(along_z(15.5, 31.5, 0.0), half, 4.5 * sigma(half)) << "the border";
+    if (linear) {
+      EXPECT_NEAR(along_z(15.5, 31.5, 0.0), half, 4.5 * sigma(half)) << "the border";
+    }
   }
 }
 
