@@ -134,7 +134,7 @@ TEST_F(LiveStatesOnGpu, IsReadBackWhenNeededInMemory) {
   const Picture expected = reference(array.values);
   struct Need {
     const char* name;
-    const Picture& expected;
+    Picture expected;
     std::function<void()> make;
   };
   const Picture interpolated = reference(array.values, CUMULET_INTERPOLATION_LINEAR);

@@ -81,8 +81,8 @@ class Blob {
       const dvec3 high = from + crossings[i] * way - shift;
       const dvec3 middle = 0.5 * (low + high);
       // Simpson's rule is exact for cubics.
-      const double mean =
-          linear ? (between(low) + 4.0 * between(middle) + between(high)) / 6.0 : voxel(glm::floor(middle + 0.5));
+      const double mean = linear ? (between(low) + 4.0 * between(middle) + between(high)) / 6.0
+                                 : voxel(glm::ivec3(glm::floor(middle + 0.5)));
       sum += mean * (crossings[i] - crossings[i - 1]);
     }
     return sum * glm::distance(a, b);
