@@ -14,10 +14,11 @@ namespace cumulet::c_abi {
 template <class Desc, class Value>
 std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& desc) {
   const auto& value = desc.*setting.field;
-  const auto stands_for_another = [&] { return value == Value{} && setting.zero != 0.0; };
   if constexpr (settings::Enumerated<Value>) {
-    const auto is = [&](const settings::Choice& c) { return number(value) == static_cast<unsigned>(c.value); };
-    return stands_for_another() || std::ranges::any_of(setting.choices, is) ? "" : "is unknown";
+    const unsigned given = number(value);
+    const auto is = [&](const settings::Choice& c) { return given == static_cast<unsigned>(c.value); };
+    const bool stands_for_another = given == 0 && setting.zero != 0.0;
+    return stands_for_another || std::ranges::any_of(setting.choices, is) ? "" : "is unknown";
   } else if constexpr (settings::Switch<Value>) {
     return value == 0 || value == 1 ? "" : "is not 0 or 1";
   } else if constexpr (settings::Triple<Value> || settings::Rectangle<Value>) {
@@ -25,7 +26,8 @@ std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& d
     const bool light = setting.range.most == settings::light_range.most;
     return holds ? "" : (light ? "is negative or not finite" : setting.range.refusal());
   } else if constexpr (settings::Real<Value>) {
-    return stands_for_another() || setting.range.holds(value) ? "" : setting.range.refusal();
+    const bool stands_for_another = value == Value{} && setting.zero != 0.0;
+    return stands_for_another || setting.range.holds(value) ? "" : setting.range.refusal();
   } else {
     static_assert(settings::Count<Value>);
     return setting.range.holds(static_cast<double>(value)) ? "" : setting.range.refusal();
