@@ -1,7 +1,7 @@
 #version 450
 // Computes the channels of a grid's cells beside density, one channel per variant, once the records exist; like
 // src/grid/tet_grid.cpp. Emission also sets CM_RECORD_EMITS in the cells' records.
-// variants: CM_CHANNEL=0,1,2,3
+// variants: CM_CHANNEL=0,1,2,3 or CM_CHANNEL=0,1,2,3 CM_LINEAR=1
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -13,6 +13,7 @@ layout(local_size_x = 64) in;
 #include "grid_state.glsl"
 #include "lattice_lookup.glsl"
 #include "grid_leaves.glsl"
+#include "grid_parts.glsl"
 
 #if CM_CHANNEL == CM_CHANNEL_EMISSION
 #define CM_RECORD_WORDS 4u
@@ -25,8 +26,6 @@ layout(local_size_x = 64) in;
 layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { float cm_numbers[]; };  // grid::ChannelNumbers
 layout(std430, binding = CM_STORAGE_GRID_COARSE) readonly buffer CmCoarse { uint cm_coarse[]; };
 layout(std430, binding = CM_STORAGE_GRID_CHANNEL) buffer CmChannel { uint cm_channel[]; };  // CM_RECORD_WORDS each
-layout(std140, binding = CM_UNIFORM_CELL_PARTS) uniform CmParts { uvec4 cm_parts[CM_CELL_PARTS]; };  // grid::CellPart
-const uint cm_first_part[11] = uint[11](CM_PARTS_OF_LEVELS);
 
 // First word of the records of a cube's cells above bricks; 0: the cube has a single value.
 uint cm_coarse_records(vec3 v0, uint shape, ivec3 voxel, out ivec3 corner) {
@@ -52,9 +51,10 @@ struct CmLight {
   bool any;
 };
 
-CmLight cm_fine_light(vec3 v0, uint shape, uint first_value) {
-  int begin = cm_voxel_at_v0(v0, shape);
-  ivec3 steps = cm_voxel_steps(shape);
+CmLight cm_fine_light(vec3 v0, uint shape, ivec3 voxel) {
+  uint first_value = CM_BRICK_VALUES * cm_brick_at(voxel);
+  int begin = cm_value_at_v0(v0, shape, voxel);
+  ivec3 steps = cm_value_steps(shape);
   uint level = cm_fine_level(shape);
   vec3 low = vec3(3e38);
   vec3 high = vec3(0.0);
@@ -63,14 +63,14 @@ CmLight cm_fine_light(vec3 v0, uint shape, uint first_value) {
   // No value is negative, so the sums have no cancellation.
   for (uint i = cm_first_part[level]; i < cm_first_part[level + 1u]; ++i) {
     uvec4 words = cm_parts[i];
-    vec3 value = cm_voxel(first_value + uint(begin + cm_voxel_of_part(words.w, steps)));
+    vec3 value = cm_voxel(first_value + uint(begin + cm_value_of_part(words.w, steps)));
     low = min(low, value);
     high = max(high, value);
     vec3 weighted = float(words.w >> 12) * value;
     sum += weighted;
     moment += outerProduct(uintBitsToFloat(words.xyz), weighted);
   }
-  float inverse_count = 1.0 / float(CM_BLOCK_POINTS >> level);
+  float inverse_count = 1.0 / float(cm_weights_of_level(level));
   vec3 mean = clamp(sum * inverse_count, low, high);
   vec3 slope = vec3(0.0);
   uint cell_class = cm_shape_class(shape);
@@ -90,11 +90,11 @@ CmLight cm_fine_light(vec3 v0, uint shape, uint first_value) {
 
 CmLight cm_light(vec3 v0, uint shape) {
   ivec3 voxel = cm_leaf_voxel(v0, shape);
-  if (cm_is_fine(shape)) return cm_fine_light(v0, shape, CM_BLOCK_POINTS * cm_brick_at(voxel));
+  if (cm_is_fine(shape)) return cm_fine_light(v0, shape, voxel);
   ivec3 corner;
   uint coarse = cm_coarse_records(v0, shape, voxel, corner);
   if (coarse == 0u) {
-    vec3 value = cm_voxel(CM_BLOCK_POINTS * cm_brick_at(voxel));
+    vec3 value = cm_voxel(CM_BRICK_VALUES * cm_brick_at(voxel));
     return CmLight(uvec4(floatBitsToUint(value), 0u), max(value.x, max(value.y, value.z)) > 0.0);
   }
   uint cell = cm_coarse_cell(v0, shape, vec3(corner));
@@ -125,14 +125,15 @@ vec4 cm_voxel(uint i) {
 #endif
 }
 
-vec4 cm_fine_sum(vec3 v0, uint shape, uint first_value) {
-  int begin = cm_voxel_at_v0(v0, shape);
-  ivec3 steps = cm_voxel_steps(shape);
+vec4 cm_fine_sum(vec3 v0, uint shape, ivec3 voxel) {
+  uint first_value = CM_BRICK_VALUES * cm_brick_at(voxel);
+  int begin = cm_value_at_v0(v0, shape, voxel);
+  ivec3 steps = cm_value_steps(shape);
   uint level = cm_fine_level(shape);
   vec4 sum = vec4(0.0);
   for (uint i = cm_first_part[level]; i < cm_first_part[level + 1u]; ++i) {
     uint word = cm_parts[i].w;
-    sum += float(word >> 12) * cm_voxel(first_value + uint(begin + cm_voxel_of_part(word, steps)));
+    sum += float(word >> 12) * cm_voxel(first_value + uint(begin + cm_value_of_part(word, steps)));
   }
   return sum;
 }
@@ -155,10 +156,10 @@ uvec2 cm_pack_sum(vec4 sum) {
 // A leaf's record, of one or two words.
 uvec2 cm_leaf_record(vec3 v0, uint shape) {
   ivec3 voxel = cm_leaf_voxel(v0, shape);
-  if (cm_is_fine(shape)) return cm_pack_sum(cm_fine_sum(v0, shape, CM_BLOCK_POINTS * cm_brick_at(voxel)));
+  if (cm_is_fine(shape)) return cm_pack_sum(cm_fine_sum(v0, shape, voxel));
   ivec3 corner;
   uint coarse = cm_coarse_records(v0, shape, voxel, corner);
-  if (coarse == 0u) return cm_pack_sum(cm_voxel(CM_BLOCK_POINTS * cm_brick_at(voxel)));
+  if (coarse == 0u) return cm_pack_sum(cm_voxel(CM_BRICK_VALUES * cm_brick_at(voxel)));
   uint at = coarse + CM_RECORD_WORDS * cm_coarse_cell(v0, shape, vec3(corner));
   return uvec2(cm_coarse[at], cm_coarse[at + CM_RECORD_WORDS - 1u]);
 }

@@ -1,4 +1,4 @@
-// Cells of a built grid, and their voxels: for the kernels that make cells and their records.
+// Cells of a built grid: for the kernels that make cells and their records.
 #ifndef CM_GRID_LEAVES_GLSL
 #define CM_GRID_LEAVES_GLSL
 
@@ -33,21 +33,6 @@ uint cm_half(float value) {
 // A voxel inside the cell.
 ivec3 cm_leaf_voxel(vec3 v0, uint shape) {
   return ivec3(v0 + cm_from_frame(cm_frame_centroid(cm_shape_class(shape)) * cm_shape_unit(shape), shape));
-}
-
-// Voxels are counted along the frame's axes from the one at v0: index of that voxel in the brick, and index steps per
-// axis.
-int cm_voxel_at_v0(vec3 v0, uint shape) {
-  return int(cm_in_block(ivec3(floor(v0 + cm_from_frame(vec3(0.5), shape)))));
-}
-ivec3 cm_voxel_steps(uint shape) {
-  uvec3 axis = uvec3((shape >> 3) & 3u, (shape >> 5) & 3u, (shape >> 7) & 3u);
-  ivec3 steps = ivec3(64) >> ivec3(3u * axis);
-  return steps * (ivec3(1) - 2 * ivec3(int(shape & 1u), int((shape >> 1) & 1u), int((shape >> 2) & 1u)));
-}
-// Index offset of a part's voxel (grid::CellPart) from the voxel at v0.
-int cm_voxel_of_part(uint word, ivec3 steps) {
-  return int(word & 15u) * steps.x + int((word >> 4) & 15u) * steps.y + int((word >> 8) & 15u) * steps.z;
 }
 
 // Extends the bounds of all nonempty cells by this cell.

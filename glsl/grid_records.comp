@@ -1,7 +1,7 @@
 #version 450
 // Writes the records of a grid's cells once their order is known, like src/grid/tet_grid.cpp: of cells in bricks
 // (CM_FINE 1), or of larger ones.
-// variants: CM_FINE=0,1 CM_HALVES=0,1
+// variants: CM_FINE=0,1 CM_HALVES=0,1 or CM_FINE=0,1 CM_HALVES=0,1 CM_LINEAR=1
 layout(local_size_x = 64) in;
 
 #include "bindings.glsl"
@@ -12,13 +12,12 @@ layout(local_size_x = 64) in;
 #include "grid_state.glsl"
 #include "lattice_lookup.glsl"
 #include "grid_leaves.glsl"
+#include "grid_parts.glsl"
 #include "grid_links.glsl"
 
 layout(std430, binding = CM_STORAGE_GRID_RECORDS) writeonly buffer CmRecords { uvec4 cm_records[]; };
-layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint cm_bricks[]; };  // 512 values each
+layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint cm_bricks[]; };  // CM_BRICK_VALUES each
 layout(std430, binding = CM_STORAGE_GRID_COARSE) readonly buffer CmCoarse { uint cm_coarse[]; };
-layout(std140, binding = CM_UNIFORM_CELL_PARTS) uniform CmParts { uvec4 cm_parts[CM_CELL_PARTS]; };  // grid::CellPart
-const uint cm_first_part[11] = uint[11](CM_PARTS_OF_LEVELS);
 layout(location = 3) uniform float cm_to_relative;  // scale from the grid's values
 layout(location = 4) uniform bool cm_linear;
 
@@ -42,12 +41,12 @@ uvec2 cm_pack(float mean, vec3 gradient) {
 
 #if CM_FINE
 
-// Averages and fits the cell's voxels.
+// Averages and fits the cell's values.
 CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
   uint level = cm_fine_level(shape);
-  uint first_value = CM_BLOCK_POINTS * cm_brick_at(voxel);
-  int begin = cm_voxel_at_v0(v0, shape);
-  ivec3 steps = cm_voxel_steps(shape);
+  uint first_value = CM_BRICK_VALUES * cm_brick_at(voxel);
+  int begin = cm_value_at_v0(v0, shape, voxel);
+  ivec3 steps = cm_value_steps(shape);
   uint part = cm_first_part[level];
   uint end = cm_first_part[level + 1u];
   float low = 0.0;
@@ -57,7 +56,7 @@ CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
   vec3 moment = vec3(0.0);
   for (uint i = part; i < end; ++i) {
     uvec4 words = cm_parts[i];
-    float value = cm_value(first_value + uint(begin + cm_voxel_of_part(words.w, steps)));
+    float value = cm_value(first_value + uint(begin + cm_value_of_part(words.w, steps)));
     if (i == part) low = high = reference = value;
     low = min(low, value);
     high = max(high, value);
@@ -65,7 +64,7 @@ CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
     sum += weighted;
     moment += weighted * uintBitsToFloat(words.xyz);
   }
-  float inverse_count = 1.0 / float(CM_BLOCK_POINTS >> level);
+  float inverse_count = 1.0 / float(cm_weights_of_level(level));
   float mean = clamp(reference + sum * inverse_count, low, high);
   vec3 gradient = vec3(0.0);
   if (cm_linear && low < high) gradient = cm_fit_linear(cm_shape_class(shape), moment * inverse_count, mean).gradient;
@@ -79,7 +78,7 @@ CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
   ivec3 corner = (voxel >> ivec3(int(size))) << ivec3(int(size));
   uint coarse = CM_COARSE_WORDS * cm_coarse_at(corner, size);
   if (coarse == 0u) {
-    float value = cm_value(CM_BLOCK_POINTS * cm_brick_at(voxel));
+    float value = cm_value(CM_BRICK_VALUES * cm_brick_at(voxel));
     return CmLeaf(cm_pack(value, vec3(0.0)), value > 0.0);
   }
   uint cell = cm_coarse_cell(v0, shape, vec3(corner));

@@ -15,6 +15,10 @@
 // Parts of cells in bricks, voxel by voxel: of the ten shapes from a brick's Kuhn tetrahedron to a voxel's.
 #define CM_PARTS_OF_LEVELS 0u, 120u, 190u, 230u, 250u, 263u, 271u, 275u, 278u, 280u, 281u
 #define CM_CELL_PARTS 281u
+// With linear interpolation, lattice point by lattice point. Weights are multiples of 1 / CM_SIXTH_BETWEEN of a sixth.
+#define CM_PARTS_OF_LEVELS_BETWEEN 0u, 253u, 420u, 527u, 590u, 636u, 668u, 688u, 704u, 716u, 724u
+#define CM_CELL_PARTS_BETWEEN 724u
+#define CM_SIXTH_BETWEEN 40u
 #define CM_COARSE_CELLS 42u
 #define CM_COARSE_WORDS 86u  // two words per cell, and two words of bits
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <file.hpp>
 #include <nlohmann/json.hpp>
+#include <settings.hpp>
 
 #include "metadata.hpp"
 
@@ -17,7 +18,9 @@ using Json = nlohmann::ordered_json;
 }  // namespace
 
 void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend) {
-  const bool tet = options.scene.grid.type == CUMULET_GRID_TETRAHEDRAL;
+  cumulet_grid_desc grid = options.scene.grid;
+  settings::spell_out_zeros(grid);
+  const bool tet = grid.type == CUMULET_GRID_TETRAHEDRAL;
   Json json;
   if (tet) {
     json["cells"] = stats.cells;
@@ -55,9 +58,9 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
     json["peak_rss_bytes"] = static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in KiB
   json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
   json["backend"] = backend;
-  json["grid_type"] = grid_type_name(options.scene.grid.type);
-  json["interpolation"] = interpolation_name(options.scene.grid.interpolation);
-  if (tet) json["cells_mode"] = options.scene.grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
+  json["grid_type"] = grid_type_name(grid.type);
+  json["interpolation"] = interpolation_name(grid.interpolation);
+  if (tet) json["cells_mode"] = grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
   // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }

@@ -65,6 +65,7 @@ std::string name_of(SceneFormat format, const Names& names, Value value) {
 template <class Desc, class Value>
 std::optional<Json> json_of(SceneFormat format, const settings::Setting<Desc, Value>& setting, const Value& value) {
   if constexpr (settings::Enumerated<Value>) {
+    if (setting.zero != 0.0 && value == Value{}) return std::nullopt;
     return name_of(format, setting.choices, value);
   } else if constexpr (settings::Switch<Value>) {
     return value != 0;

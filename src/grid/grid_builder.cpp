@@ -15,9 +15,11 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "grid/brick_voxels.hpp"
 #include "grid/cell.hpp"
 #include "grid/clear_cones.hpp"
 #include "grid/lattice_channel.hpp"
+#include "grid/sixth_means.hpp"
 
 namespace cumulet::grid {
 
@@ -320,7 +322,7 @@ class GridBuilder::LeafDensity {
 class GridBuilder::LeafVoxels {
  public:
   explicit LeafVoxels(std::span<const Statistics* const> fields)
-      : fields_(fields.begin(), fields.end()), found_(fields.size()), rooms_(fields.size()) {}
+      : fields_(fields.begin(), fields.end()), found_(fields.size()) {}
   // Returns the masses of the fields.
   ChannelFields::CellMoments operator()(const Node& node, const vec3& centroid) {
     ChannelFields::CellMoments sums{};
@@ -332,35 +334,44 @@ class GridBuilder::LeafVoxels {
     look_up(ivec3(centroid) & ~(volume::brick_size - 1));
     const BrickTree& tree = brick_tree(kuhn_frame(corner_, volume::brick_size, node.permutation));
     const std::uint32_t leaves = 512U / std::bit_floor(std::uint32_t{node.heap});
-    const auto voxels = std::span(tree.voxel).subspan(node.heap * leaves - 512U, leaves);
+    const std::uint32_t first = node.heap * leaves - 512U;
     for (std::size_t i = 0; i < fields_.size(); ++i) {
-      const Found& found = found_[i];
+      const BrickVoxels& voxels = found_[i];
       double& sum = sums[i].mass;
-      sum = found.values == nullptr ? double{found.uniform} * leaves : 0.0;
-      for (std::size_t v = 0; found.values != nullptr && v < voxels.size(); ++v) sum += found.values[voxels[v]];
+      if (voxels.uniform()) {
+        sum = double{*voxels.uniform()} * leaves;
+      } else if (fields_[i]->interpolates()) {
+        for (const auto& leaf : std::span(tree.leaf).subspan(first, leaves)) sum += mean_between(voxels, leaf);
+      } else {
+        for (const auto voxel : std::span(tree.voxel).subspan(first, leaves)) sum += voxels[voxel];
+      }
     }
     return sums;
   }
 
  private:
-  // Values of a field's brick, or its uniform value.
-  struct Found {
-    const float* values = nullptr;
-    float uniform = 0.0F;
-  };
   void look_up(const ivec3& corner) {
     if (corner == corner_) return;
     corner_ = corner;
-    for (std::size_t i = 0; i < fields_.size(); ++i) {
-      const Statistics::Node& holder = fields_[i]->node_at(corner);
-      found_[i] = {holder.is_uniform() ? nullptr : fields_[i]->values(holder, rooms_[i]), holder.uniform};
+    for (std::size_t i = 0; i < fields_.size(); ++i) found_[i].look_up(*fields_[i], corner);
+  }
+  // Mean of the interpolated field in a sixth of a cell.
+  static double mean_between(const BrickVoxels& voxels, const BrickTree::Leaf& leaf) {
+    static constexpr std::array<double, sixth_monomials> weights{
+        mean_of_weight(0), mean_of_weight(1), mean_of_weight(2), mean_of_weight(3),
+        mean_of_weight(4), mean_of_weight(5), mean_of_weight(6), mean_of_weight(7)};
+    double mean = 0.0;
+    for (std::size_t corner = 0; corner < weights.size(); ++corner) {
+      int at = leaf.first;
+      for (unsigned axis = 0; axis < 3; ++axis) at += exponent_in(corner, axis) != 0 ? leaf.step[axis] : 0;
+      mean += weights[corner] * double{voxels[at]};
     }
+    return mean;
   }
 
   std::vector<const Statistics*> fields_;
   ivec3 corner_{-1};  // corner of the brick in found_
-  std::vector<Found> found_;
-  std::vector<volume::BrickValues::Brick> rooms_;
+  std::vector<BrickVoxels> found_;
 };
 
 // Computes all channels of leaves other than density. A field that several channels share is summed once.

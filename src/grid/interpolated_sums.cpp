@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <glm/glm.hpp>
 
+#include "grid/sixth_means.hpp"
 #include "grid/statistics.hpp"
 
 namespace cumulet::grid {
@@ -14,21 +15,7 @@ using glm::vec3;
 
 namespace {
 
-// Monomials u^a v^b w^c of the trilinear function in a sixth of a cell, 1 >= u >= v >= w >= 0, by three bits a, b, c.
-constexpr std::size_t monomials = 8;
-
-constexpr unsigned exponent_in(std::size_t monomial, unsigned axis) {
-  return static_cast<unsigned>(monomial >> axis) & 1U;
-}
-
-// Mean of a product of two monomials and, with axis 0 to 2, of the coordinate along this axis.
-constexpr double mean_of_product(std::size_t i, std::size_t j, unsigned axis = 3) {
-  const auto exponent = [&](unsigned of) { return exponent_in(i, of) + exponent_in(j, of) + (axis == of ? 1U : 0U); };
-  const unsigned a = exponent(0);
-  const unsigned b = exponent(1);
-  const unsigned c = exponent(2);
-  return 6.0 / ((c + 1.0) * (b + c + 2.0) * (a + b + c + 3.0));
-}
+constexpr std::size_t monomials = sixth_monomials;
 
 // Coefficients of the monomials at all leaves.
 using LeafCoefficients = std::array<std::array<float, 512>, monomials>;

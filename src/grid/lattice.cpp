@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "base/progress_part.hpp"
 #include "grid/cell.hpp"
 #include "grid/evaluation.hpp"
+#include "grid/sixth_means.hpp"
 
 namespace cumulet::grid {
 
@@ -97,9 +99,9 @@ Lattice::Lattice(const Statistics& statistics, const Channels& beside, const Ref
 }
 
 std::uint64_t Lattice::device_bytes() const {
-  std::uint64_t values = std::uint64_t{bricks} * volume::brick_voxels * (halves ? 2 : 4);
+  std::uint64_t values = std::uint64_t{bricks} * brick_voxels() * (halves ? 2 : 4);
   for (const LatticeChannel& channel : channels)
-    values += (channel.even_bricks.size() + channel.bricks.size()) * volume::brick_voxels * channel.numbers * 4;
+    values += (channel.even_bricks.size() + channel.bricks.size()) * channel.brick_voxels * channel.numbers * 4;
   return bytes() + values + 2 * own.to_rate.values + std::uint64_t{blocks.size()} * CM_BLOCK_POINTS * 4;
 }
 
@@ -250,6 +252,7 @@ LatticeChannel Lattice::make_channel(const ChannelFields& fields, const Progress
   made.channel = fields.channel();
   made.numbers = fields.count();
   made.fastest = fields.fastest();
+  made.brick_voxels = brick_voxels();
   fill_bricks(fields, made, progress);
   const std::size_t words = fields.record_words();
   const std::size_t cube_words = core::cm_coarse_channel_words(static_cast<std::uint32_t>(words));
@@ -295,51 +298,68 @@ void Lattice::fill_bricks(const ChannelFields& fields, LatticeChannel& made, con
 
 namespace {
 
-// Sixths of one voxel and the sum of their centroids.
-struct Sixths {
-  unsigned count = 0;
-  glm::dvec3 sum{0.0};
+// The weight of one voxel in a cell, in sixths, and its moment.
+struct Share {
+  double weight = 0.0;
+  glm::dvec3 moment{0.0};
 };
-using Voxels = std::map<std::tuple<int, int, int>, Sixths>;
+using Shares = std::map<std::tuple<int, int, int>, Share>;
 
-void collect(const vec3& v0, std::uint32_t shape, Voxels& voxels) {
-  if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 0) {
+void add_sixth(const vec3& v0, std::uint32_t shape, Interpolation interpolation, Shares& shares) {
+  const auto add = [&](const ivec3& voxel, double weight, const glm::dvec3& moment) {
+    Share& share = shares[{voxel.x, voxel.y, voxel.z}];
+    share.weight += weight;
+    share.moment += moment;
+  };
+  if (interpolation == Interpolation::nearest) {
     const glm::dvec3 middle = centroid_of(v0, shape);
-    const ivec3 voxel(glm::floor(middle));
-    Sixths& sixths = voxels[{voxel.x, voxel.y, voxel.z}];
-    ++sixths.count;
-    sixths.sum += middle;
-    return;
+    return add(ivec3(glm::floor(middle)), 1.0, middle);
   }
-  collect(v0, core::cm_child_shape(shape, 0), voxels);
-  collect(core::cm_cell_vertex(v0, shape, 1), core::cm_child_shape(shape, 1), voxels);
+  for (std::size_t corner = 0; corner < sixth_monomials; ++corner) {
+    const vec3 offset(exponent_in(corner, 0), exponent_in(corner, 1), exponent_in(corner, 2));
+    const glm::dvec3 mean(mean_of_weight(corner, 0), mean_of_weight(corner, 1), mean_of_weight(corner, 2));
+    const double weight = mean_of_weight(corner);
+    add(ivec3(v0 + core::cm_from_frame(offset, shape)), weight,
+        weight * glm::dvec3(v0) + glm::dvec3(core::cm_from_frame(vec3(mean), shape)));
+  }
 }
 
-CellParts make_cell_parts() {
-  CellParts all{};
-  std::size_t count = 0;
+void collect(const vec3& v0, std::uint32_t shape, Interpolation interpolation, Shares& shares) {
+  if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 0)
+    return add_sixth(v0, shape, interpolation, shares);
+  collect(v0, core::cm_child_shape(shape, 0), interpolation, shares);
+  collect(core::cm_cell_vertex(v0, shape, 1), core::cm_child_shape(shape, 1), interpolation, shares);
+}
+
+CellParts make_cell_parts(Interpolation interpolation) {
+  CellParts made;
+  unsigned count = 0;
+  if (interpolation == Interpolation::linear) made.sixth = CM_SIXTH_BETWEEN;
   // Frame whose axes are the cube's axes.
   std::uint32_t shape = (1U << 5U) | (2U << 7U) | (1U << 9U) | (3U << 11U);
   for (unsigned level = 0; level <= brick_levels; ++level) {
-    Voxels voxels;
-    collect(vec3(0.0F), shape, voxels);
+    Shares shares;
+    collect(vec3(0.0F), shape, interpolation, shares);
     const glm::dvec3 centroid = centroid_of(vec3(0.0F), shape);
-    for (const auto& [voxel, sixths] : voxels) {
+    for (const auto& [voxel, share] : shares) {
       const auto [x, y, z] = voxel;
-      const glm::dvec3 middle = sixths.sum / double(sixths.count);
-      all[count++] = {vec3((middle - centroid) * double(core::cm_shape_inverse_unit(shape))),
-                      static_cast<std::uint32_t>(x | (y << 4) | (z << 8)) | (sixths.count << 12U)};
+      const auto weight = static_cast<std::uint32_t>(std::lround(share.weight * made.sixth));
+      made.parts[count++] = {
+          vec3((share.moment / share.weight - centroid) * double(core::cm_shape_inverse_unit(shape))),
+          static_cast<std::uint32_t>(x | (y << 4) | (z << 8)) | (weight << 12U)};
     }
+    made.first[level + 1] = count;
     shape = core::cm_child_shape(shape, 0);
   }
-  return all;
+  return made;
 }
 
 }  // namespace
 
-const CellParts& cell_parts() {
-  static const CellParts all = make_cell_parts();
-  return all;
+const CellParts& cell_parts(Interpolation interpolation) {
+  static const CellParts nearest = make_cell_parts(Interpolation::nearest);
+  static const CellParts linear = make_cell_parts(Interpolation::linear);
+  return interpolation == Interpolation::linear ? linear : nearest;
 }
 
 }  // namespace cumulet::grid

@@ -35,6 +35,7 @@ static_assert(sizeof(CoarseCells) == 4 * CM_COARSE_WORDS);
 struct LatticeChannel {
   Channel channel = Channel::emission;
   std::size_t numbers = 0;            ///< values per voxel
+  std::size_t brick_voxels = 0;       ///< as Lattice::brick_voxels()
   std::vector<LatticeEntry> entries;  ///< as Lattice::entries, with this channel's bricks and coarse cells
   /// Per octree cube above bricks: the records of its cells, indexed by cm_coarse_cell(). For emission one bit per cell
   /// follows, set if the cell emits. The first cube is an empty placeholder.
@@ -75,6 +76,10 @@ struct Lattice {
   CellKind cells = CellKind::linear;
   std::vector<LatticeChannel> channels;  ///< one for each channel that the volume has
 
+  /// Number of voxels in GPU memory for each brick: its own, or with interpolation those at its lattice points.
+  [[nodiscard]] std::size_t brick_voxels() const {
+    return cube.interpolation == Interpolation::linear ? BrickCorners().size() : volume::brick_voxels;
+  }
   [[nodiscard]] std::uint32_t top_scale() const { return static_cast<std::uint32_t>(cube.log2_size) / 3; }
   /// Main memory in bytes, without the volume's.
   [[nodiscard]] std::uint64_t bytes() const {
@@ -102,17 +107,22 @@ struct Lattice {
 };
 using LatticePtr = std::shared_ptr<const Lattice>;
 
-/// The part of a cell that lies in one voxel, for cells within a brick, in the cell's frame. Readers:
-/// glsl/grid_records.comp, glsl/grid_channels.comp.
+/// The part of a cell that lies in one voxel, for cells within a brick, in the cell's frame. With interpolation: the
+/// share of the voxel at a lattice point. Readers: glsl/grid_records.comp, glsl/grid_channels.comp.
 struct CellPart {
   glm::vec3 from_centroid;  ///< from the cell's centroid to this part's centroid, in the cell's units
-  std::uint32_t packed;     ///< x | y << 4 | z << 8 | sixths << 12; x, y, z: the voxel's low corner relative to v0
+  std::uint32_t packed;     ///< x | y << 4 | z << 8 | weight << 12; x, y, z: the voxel's low corner, or the lattice
+                            ///< point, relative to v0
 };
 static_assert(sizeof(CellPart) == 16);
 /// Parts of the ten cell shapes within bricks, by level: 0 is a brick's Kuhn tetrahedron, 9 a sixth of a voxel. Parts
-/// of a level are [parts_of_levels[level], parts_of_levels[level + 1]).
-using CellParts = std::array<CellPart, CM_CELL_PARTS>;
-inline constexpr std::array<unsigned, brick_levels + 2> parts_of_levels{CM_PARTS_OF_LEVELS};
-const CellParts& cell_parts();
+/// of a level are [first[level], first[level + 1]).
+struct CellParts {
+  std::array<CellPart, CM_CELL_PARTS_BETWEEN> parts{};
+  std::array<unsigned, brick_levels + 2> first{};
+  unsigned sixth = 1;  ///< sum of the weights in a sixth of a voxel
+  [[nodiscard]] unsigned size() const { return first.back(); }
+};
+const CellParts& cell_parts(Interpolation interpolation);
 
 }  // namespace cumulet::grid

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "base/luminance.hpp"
+#include "grid/brick_voxels.hpp"
 #include "grid/evaluation.hpp"
-#include "volume/brick_values.hpp"
 
 namespace cumulet::grid {
 
@@ -70,21 +70,11 @@ std::optional<ChannelNumbers> ChannelFields::even(const ivec3& corner, int log2_
 }
 
 void ChannelFields::fill(const ivec3& corner, std::span<float> out) const {
-  struct Found {
-    const float* values = nullptr;  // of a brick; null: uniform
-    float uniform = 0.0F;
-    volume::BrickValues::Brick room{};
-  };
-  std::array<Found, max_channel_fields> found;
-  for (std::size_t i = 0; i < used_; ++i) {
-    const Statistics::Node& node = fields_[i]->node_at(corner);
-    found[i].uniform = node.uniform;
-    if (!node.is_uniform()) found[i].values = fields_[i]->values(node, found[i].room);
-  }
+  std::array<BrickVoxels, max_channel_fields> found;
+  for (std::size_t i = 0; i < used_; ++i) found[i].look_up(*fields_[i], corner);
   std::array<float, max_channel_fields> values{};
-  for (std::size_t v = 0; v < volume::brick_voxels; ++v) {
-    for (std::size_t i = 0; i < used_; ++i)
-      values[i] = found[i].values == nullptr ? found[i].uniform : found[i].values[v];
+  for (std::size_t v = 0; v < out.size() / count(); ++v) {
+    for (std::size_t i = 0; i < used_; ++i) values[i] = found[i][static_cast<int>(v)];
     const ChannelNumbers here = numbers(values);
     std::copy_n(here.begin(), count(), out.begin() + static_cast<std::ptrdiff_t>(v * count()));
   }

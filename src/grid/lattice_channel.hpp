@@ -42,7 +42,7 @@ class ChannelFields {
   [[nodiscard]] std::span<const Statistics* const> statistics() const { return {fields_.data(), used_}; }
   /// Returns the values of all voxels of an octree cube if they are uniform, else nullopt.
   [[nodiscard]] std::optional<ChannelNumbers> even(const glm::ivec3& corner, int log2_size) const;
-  /// Writes the values of a brick's voxels: count() * volume::brick_voxels floats.
+  /// Writes count() values of each of the brick's voxels (Lattice::brick_voxels()).
   void fill(const glm::ivec3& corner, std::span<float> out) const;
   /// Moments of each of statistics() over a cell.
   using CellMoments = std::array<Moments, max_channel_fields>;

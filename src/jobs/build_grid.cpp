@@ -47,10 +47,8 @@ bool interpolates(const BuildSettings& settings) { return settings.interpolation
 // Returns whether the GPU builds a tetrahedral grid; logs the reason if the CPU builds it instead.
 bool builds_on_gpu(const Log& log, const VolumeAsset& volume, const BuildSettings& settings, bool moves) {
   if (settings.on != BuildOn::gpu) return false;
-  if (!moves && !interpolates(settings)) return true;
-  log.info(volume.name() + ": its grid is built on the CPU because it has " +
-           (moves ? "motion blur" : "linear interpolation"));
-  return false;
+  if (moves) log.info(volume.name() + ": its grid is built on the CPU because it has motion blur");
+  return !moves;
 }
 
 }  // namespace
@@ -110,7 +108,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   grid::LatticePtr lattice;
   std::optional<std::uint64_t> planned;
   if (on_gpu) {
-    lattice = volume->lattice(settings.density_ramp, channels, refine, progress);
+    lattice = shown.lattice(settings.density_ramp, channels, refine, progress);
     planned = planned_cells_that_fit(max_cells, carried, *lattice, volume->bytes(), resource_limits);
     if (!planned && in_gl) {
       in_gl->ask_for_values();

@@ -40,6 +40,11 @@ std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
 }
 
 gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {gl::macros::stage(stage)}}; }
+// A program for the interpolation of the lattice's values.
+gl::ProgramKey key_between(const grid::Lattice& lattice, gl::ProgramKey key) {
+  if (lattice.cube.interpolation == grid::Interpolation::linear) key.defines.emplace_back(gl::macros::linear(1));
+  return key;
+}
 gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {gl::macros::stage(stage)}}; }
 
 }  // namespace
@@ -244,6 +249,7 @@ void GridBuild::plan_cells() {
 }
 
 void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind) {
+  const grid::CellParts& parts = grid::cell_parts(data_->lattice().cube.interpolation);
   // All cells of a level have the same size.
   std::uint32_t shape = grid::root_cells(data_->lattice().cube.log2_size)[0].shape;
   std::uint32_t begin = tree_levels_.back().splits_end;
@@ -252,7 +258,7 @@ void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bi
     if (core::cm_is_fine(shape)) {
       pass = fine;
       const std::uint32_t fine_level = core::cm_fine_level(shape);
-      pass.weight += parts_weight * (grid::parts_of_levels[fine_level + 1] - grid::parts_of_levels[fine_level]);
+      pass.weight += parts_weight * (parts.first[fine_level + 1] - parts.first[fine_level]);
     }
     passes_.plan(*cells_, pass, begin, begin + level.leaves(), bind);
     begin += level.leaves();
@@ -275,7 +281,8 @@ void GridBuild::plan_records() {
     gl_->ProgramUniform1i(program, 4, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
   };
   const auto key = [this](bool fine) {
-    return gl::ProgramKey{"grid_records.comp", {gl::macros::fine(fine), gl::macros::halves(data_->lattice().halves)}};
+    const grid::Lattice& lattice = data_->lattice();
+    return key_between(lattice, {"grid_records.comp", {gl::macros::fine(fine), gl::macros::halves(lattice.halves)}});
   };
   plan_leaves({key(false), 32}, {key(true), 32}, bind);
 }
@@ -335,7 +342,7 @@ void GridBuild::plan_channel(std::size_t index) {
       gl_->ProgramUniform1i(program, 3, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
     if (channel.channel == grid::Channel::velocity) gl_->ProgramUniform1f(program, 3, channel.fastest);
   };
-  const Pass pass{{"grid_channels.comp", {gl::macros::channel(channel.channel)}}, 32};
+  const Pass pass{key_between(data_->lattice(), {"grid_channels.comp", {gl::macros::channel(channel.channel)}}), 32};
   plan_leaves(pass, pass, bind);
 }
 

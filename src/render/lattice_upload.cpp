@@ -8,6 +8,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
+#include "grid/brick_voxels.hpp"
 #include "grid/cell.hpp"
 #include "grid/evaluation.hpp"
 #include "shader_macros.hpp"
@@ -77,7 +78,8 @@ LatticeUpload::LatticeUpload(const gl::FunctionsPtr& gl, gl::ProgramsPtr program
   plan_buffer(data_->state_, sizeof(core::CmGridState), nullptr, "creating the grid's state");
   static const BrickPointWords points = brick_point_words();
   plan_buffer(data_->points_, sizeof points, points.data(), "creating the sample points of bricks");
-  plan_buffer(data_->parts_, sizeof(grid::CellParts), grid::cell_parts().data(), "creating the cell parts");
+  const grid::CellParts& parts = grid::cell_parts(l.cube.interpolation);
+  plan_buffer(data_->parts_, parts.size() * sizeof(grid::CellPart), parts.parts.data(), "creating the cell parts");
 }
 
 void LatticeUpload::plan_buffer(gl::Object& buffer, std::uint64_t bytes, const void* from, const char* what) {
@@ -105,23 +107,23 @@ void LatticeUpload::plan_values(const gl::Object& buffer, std::size_t bricks, st
 
 void LatticeUpload::plan_bricks() {
   const grid::Lattice& l = *data_->lattice_;
-  const std::size_t brick_bytes = volume::brick_voxels * (l.halves ? sizeof(std::uint16_t) : sizeof(float));
+  const std::size_t brick_bytes = l.brick_voxels() * (l.halves ? sizeof(std::uint16_t) : sizeof(float));
   const auto fill = [this, &l, brick_bytes](std::size_t brick, std::byte* to) {
     const std::vector<std::uint32_t>& nodes = statistics_->nodes_of_size(3);
-    volume::BrickValues::Brick room;
-    const float* values = room.data();
+    std::vector<float> values(l.brick_voxels());
     if (brick < l.even_bricks.size()) {
-      room.fill(l.even_bricks[brick]);
+      std::ranges::fill(values, l.even_bricks[brick]);
     } else {
-      values = statistics_->values(statistics_->nodes()[nodes[brick - l.even_bricks.size()]], room);
+      grid::BrickVoxels voxels;
+      voxels.look_up(*statistics_, statistics_->nodes()[nodes[brick - l.even_bricks.size()]].corner);
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] = voxels[static_cast<int>(i)];
     }
     if (l.halves) {
-      std::array<std::uint16_t, volume::brick_voxels> halves{};
-      std::transform(values, values + volume::brick_voxels, halves.begin(),
-                     [](float value) { return volume::exact_half(value).value_or(0); });
+      std::vector<std::uint16_t> halves(values.size());
+      std::ranges::transform(values, halves.begin(), [](float value) { return volume::exact_half(value).value_or(0); });
       std::memcpy(to, halves.data(), brick_bytes);
     } else {
-      std::memcpy(to, values, brick_bytes);
+      std::memcpy(to, values.data(), brick_bytes);
     }
   };
   plan_buffer(data_->bricks_, std::uint64_t{l.bricks} * brick_bytes, nullptr, "creating the values of bricks");
@@ -258,7 +260,7 @@ void LatticeUpload::plan_channels() {
                 "creating a channel's index");
     plan_buffer(data.coarse, channel.coarse.size() * 4, channel.coarse.data(), "creating a channel's coarse cells");
     const auto fill = [&channel, &fields = fields_[i]](std::size_t brick, std::byte* to) {
-      std::vector<float> numbers(volume::brick_voxels * channel.numbers);
+      std::vector<float> numbers(channel.brick_voxels * channel.numbers);
       if (brick < channel.even_bricks.size()) {
         for (std::size_t n = 0; n < numbers.size(); ++n) numbers[n] = channel.even_bricks[brick][n % channel.numbers];
       } else {
@@ -267,7 +269,7 @@ void LatticeUpload::plan_channels() {
       std::memcpy(to, numbers.data(), numbers.size() * sizeof(float));
     };
     const std::size_t bricks = channel.even_bricks.size() + channel.bricks.size();
-    const std::size_t brick_bytes = volume::brick_voxels * channel.numbers * sizeof(float);
+    const std::size_t brick_bytes = channel.brick_voxels * channel.numbers * sizeof(float);
     plan_buffer(data.bricks, bricks * brick_bytes, nullptr, "creating a channel's brick values");
     const bool on_device = fields_[i].statistics()[0]->on_device() != nullptr;
     plan_values(data.bricks, on_device ? channel.even_bricks.size() : bricks, brick_bytes, fill);

@@ -182,7 +182,7 @@ constexpr void spell_out_zeros(Desc& desc) {
   for_each<Desc>([&](const auto& setting) {
     auto& value = desc.*setting.field;
     using Value = std::remove_reference_t<decltype(value)>;
-    if constexpr (Count<Value> || Real<Value>) {
+    if constexpr (Enumerated<Value> || Count<Value> || Real<Value>) {
       if (value == Value{} && setting.zero != 0.0) value = static_cast<Value>(setting.zero);
     } else if constexpr (Triple<Value>) {
       const bool none = all_zero(value);

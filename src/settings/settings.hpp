@@ -455,7 +455,8 @@ struct Table<cumulet_grid_desc> {
         .row = {.label = "Build on",
                 .tip = "Where the grid is built. The GPU is faster when the camera moves with a camera-adaptive "
                        "grid."}}),
-      Setting(&Desc::interpolation, {.name = "interpolation", .choices = voxel_interpolation_choices,
+      Setting(&Desc::interpolation, {.name = "interpolation", .zero = CUMULET_INTERPOLATION_NEAREST,
+        .choices = voxel_interpolation_choices,
         .key = "grid.interpolation", .flag = "--interpolation",
         .help = "Interpolation between voxels: constant cubes, or trilinear between their centers (default: nearest)",
         .row = {.label = "Interpolation",

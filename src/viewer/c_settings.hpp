@@ -15,8 +15,10 @@ template <class Desc, class Value>
 std::string refusal(const settings::Setting<Desc, Value>& setting, const Desc& desc) {
   const auto& value = desc.*setting.field;
   if constexpr (settings::Enumerated<Value>) {
-    const auto is = [&](const settings::Choice& c) { return number(value) == static_cast<unsigned>(c.value); };
-    return std::ranges::any_of(setting.choices, is) ? "" : "is unknown";
+    const unsigned given = number(value);
+    const auto is = [&](const settings::Choice& c) { return given == static_cast<unsigned>(c.value); };
+    const bool stands_for_another = given == 0 && setting.zero != 0.0;
+    return stands_for_another || std::ranges::any_of(setting.choices, is) ? "" : "is unknown";
   } else if constexpr (settings::Switch<Value>) {
     return value == 0 || value == 1 ? "" : "is not 0 or 1";
   } else if constexpr (settings::Triple<Value> || settings::Rectangle<Value>) {

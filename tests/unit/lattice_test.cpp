@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <set>
 
 #include "grid/evaluation.hpp"
@@ -226,19 +227,58 @@ TEST(Lattice, BrickEdgeLengthsCoverAllTheirCells) {
 
 TEST(Lattice, SubcellVolumesSumToTheCell) {
   // In sixths of voxels, each shape has half of the previous one. The parts' centers balance about the centroid.
-  const grid::CellParts& parts = grid::cell_parts();
-  for (unsigned level = 0; level <= grid::brick_levels; ++level) {
-    unsigned sixths = 0;
-    vec3 moment(0.0F);
-    for (unsigned i = grid::parts_of_levels[level]; i < grid::parts_of_levels[level + 1]; ++i) {
-      const unsigned count = parts[i].packed >> 12U;
-      EXPECT_GE(count, 1U);
-      EXPECT_LE(count, 6U);
-      sixths += count;
-      moment += static_cast<float>(count) * parts[i].from_centroid;
+  for (const auto interpolation : {grid::Interpolation::nearest, grid::Interpolation::linear}) {
+    const grid::CellParts& parts = grid::cell_parts(interpolation);
+    for (unsigned level = 0; level <= grid::brick_levels; ++level) {
+      unsigned weight = 0;
+      vec3 moment(0.0F);
+      for (unsigned i = parts.first[level]; i < parts.first[level + 1]; ++i) {
+        const unsigned count = parts.parts[i].packed >> 12U;
+        EXPECT_GE(count, 1U);
+        EXPECT_LE(count, 6U * parts.sixth);
+        weight += count;
+        moment += static_cast<float>(count) * parts.parts[i].from_centroid;
+      }
+      EXPECT_EQ(weight, parts.sixth * (512U >> level));
+      EXPECT_LT(glm::length(moment), 1e-4F * static_cast<float>(parts.sixth)) << level;
     }
-    EXPECT_EQ(sixths, 512U >> level);
-    EXPECT_LT(glm::length(moment), 1e-4F) << level;
+  }
+}
+
+TEST(Lattice, ShadersHaveTheRangesOfParts) {
+  using First = std::array<unsigned, grid::brick_levels + 2>;
+  EXPECT_EQ(grid::cell_parts(grid::Interpolation::nearest).first, (First{CM_PARTS_OF_LEVELS}));
+  EXPECT_EQ(grid::cell_parts(grid::Interpolation::nearest).size(), CM_CELL_PARTS);
+  EXPECT_EQ(grid::cell_parts(grid::Interpolation::linear).first, (First{CM_PARTS_OF_LEVELS_BETWEEN}));
+  EXPECT_EQ(grid::cell_parts(grid::Interpolation::linear).size(), CM_CELL_PARTS_BETWEEN);
+}
+
+// The parts of a cell give the same mean and covariance as the sums over its sixths.
+TEST(Lattice, PartsBetweenVoxelsMatchTheSumsOfBricks) {
+  test::Random random(4);
+  grid::BrickCorners corners{};
+  for (float& value : corners) value = static_cast<float>(random()) * 0x1p-32F;
+  const grid::CellParts& parts = grid::cell_parts(grid::Interpolation::linear);
+  const grid::BrickTree& tree = grid::brick_tree(grid::kuhn_frame(ivec3(0), 8, 0));
+  const auto sums = std::make_unique<grid::BrickSums>();
+  sums->compute_between(corners, 0.5F, tree);
+  for (unsigned level = 0; level < grid::brick_levels; ++level) {
+    const unsigned heap = 1U << level;  // the cell at vertex 0
+    const std::uint32_t shape = tree.shape[heap];
+    double mean = 0.0;
+    glm::dvec3 moment(0.0);
+    for (unsigned i = parts.first[level]; i < parts.first[level + 1]; ++i) {
+      const std::uint32_t word = parts.parts[i].packed;
+      const ivec3 p(core::cm_from_frame(vec3(word & 15U, (word >> 4U) & 15U, (word >> 8U) & 15U), shape));
+      const double weighted = double{corners[static_cast<std::size_t>((p.x * 9 + p.y) * 9 + p.z)]} * (word >> 12U) /
+                              (40.0 * (512U >> level));
+      mean += weighted;
+      moment += weighted * glm::dvec3(parts.parts[i].from_centroid);
+    }
+    const grid::Moments expected = sums->moments(heap, ivec3(0), tree);
+    EXPECT_NEAR(mean, expected.mean(), 1e-5) << level;
+    const glm::dvec3 centroid(tree.node_centroid[heap]);
+    EXPECT_LT(glm::distance(vec3(moment), grid::frame_covariance(expected, shape, centroid)), 1e-5F) << level;
   }
 }
 

@@ -216,18 +216,21 @@ TEST_F(Limits, MemoryLimitHolds) {
 // Voxel grid types cannot be coarsened.
 TEST_F(Limits, MemoryLimitHoldsForVoxelGrids) {
   const VolumeRef ball = make_ball(40);
-  const ViewerPtr viewer = make();
-  auto grid = make_desc<cumulet_grid_desc>();
-  grid.type = CUMULET_GRID_BRICKS;
-  ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
-  picture_of(viewer.get(), ball.get(), target_);
-  const std::uint64_t all = stats_of(viewer).memory_bytes;
-  limit(viewer, all);
-  ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
-  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
-  limit(viewer, all - 1);
-  ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
-  EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_OUT_OF_MEMORY);
+  for (const cumulet_interpolation interpolation : {CUMULET_INTERPOLATION_NEAREST, CUMULET_INTERPOLATION_LINEAR}) {
+    const ViewerPtr viewer = make();
+    auto grid = make_desc<cumulet_grid_desc>();
+    grid.type = CUMULET_GRID_BRICKS;
+    grid.interpolation = interpolation;
+    ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
+    picture_of(viewer.get(), ball.get(), target_);
+    const std::uint64_t all = stats_of(viewer).memory_bytes;
+    limit(viewer, all);
+    ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_OK);
+    limit(viewer, all - 1);
+    ASSERT_EQ(cumulet_rebuild(viewer.get()), CUMULET_OK);
+    EXPECT_EQ(cumulet_wait(viewer.get(), -1.0), CUMULET_ERROR_OUT_OF_MEMORY);
+  }
 }
 
 // Refines to the voxels: so many cells that a page of the heap is small in comparison.

@@ -134,11 +134,14 @@ TEST_F(LiveStatesOnGpu, IsReadBackWhenNeededInMemory) {
   const Picture expected = reference(array.values);
   struct Need {
     const char* name;
+    Picture expected;
     std::function<void()> make;
   };
+  const Picture interpolated = reference(array.values, CUMULET_INTERPOLATION_LINEAR);
   const std::vector<Need> needs{
-      {"its voxels", [&] { get_volume(CUMULET_ERROR_UNSUPPORTED); }},
-      {"a build of the processor's",
+      {"its voxels", expected, [&] { get_volume(CUMULET_ERROR_UNSUPPORTED); }},
+      {"linear interpolation", interpolated, [&] { interpolate(v_, CUMULET_INTERPOLATION_LINEAR); }},
+      {"a build of the processor's", expected,
        [&] {
          auto grid = make_desc<cumulet_grid_desc>();
          grid.build_device = CUMULET_BUILD_CPU;
@@ -155,7 +158,7 @@ TEST_F(LiveStatesOnGpu, IsReadBackWhenNeededInMemory) {
     need.make();
     EXPECT_EQ(arrive(), 1U);  // the same state again, now in main memory
     expect_same_fields(newest(live_), alone(dense(odd, array.values)));
-    EXPECT_EQ(difference(picture(), expected), "");
+    EXPECT_EQ(difference(picture(), need.expected), "");
     EXPECT_TRUE(shows_voxels());
     const Array next(CUMULET_VOXEL_FORMAT_R8, simulated(CUMULET_CHANNEL_DENSITY, odd, 2));
     hand_over_density(next, voxel_types[3]);

@@ -484,8 +484,16 @@ TEST_P(MotionBlur, VolumeMovesByItsVelocityField) {
   const double depth = 0.1 * 16.0;
   const double passing = (1.0 - std::exp(-depth)) / depth;
   const double held = std::exp(-depth);
-  for (const test::MarchKind& kind : test::march_kinds) {
-    still_->set_grid(test::settings_of(kind));
+  const double half = std::exp(-0.5 * depth);
+  std::vector<viewer::GridSettings> grids;
+  for (const test::MarchKind& kind : test::march_kinds) grids.push_back(test::settings_of(kind));
+  for (const test::MarchKind& kind : {test::march_kinds[2], test::march_kinds[3]}) {
+    grids.push_back(test::settings_of(kind));
+    grids.back().build.interpolation = grid::Interpolation::linear;
+  }
+  for (const viewer::GridSettings& grid : grids) {
+    const bool linear = grid.build.interpolation == grid::Interpolation::linear;
+    still_->set_grid(grid);
     // From [-8.5, 7.5] to [7.5, 23.5] in a second.
     EXPECT_NEAR(along_z(0.0, 31.5), passing, 4.5 * sigma(passing)) << "it leaves";
     EXPECT_NEAR(along_z(16.0, 31.5), passing, 4.5 * sigma(passing)) << "it comes";
@@ -495,6 +503,9 @@ TEST_P(MotionBlur, VolumeMovesByItsVelocityField) {
     EXPECT_NEAR(along_z(14.0, 31.5, 0.5), passing, 4.5 * sigma(passing)) << "less far in less time";
     EXPECT_NEAR(along_z(0.0, 31.5, 0.0), held, 4.5 * sigma(held)) << "the shutter is closed";
     EXPECT_NEAR(along_z(18.0, 31.5, 0.0), 1.0, 1e-6) << "the shutter is closed";
+    if (linear) {
+      EXPECT_NEAR(along_z(15.5, 31.5, 0.0), half, 4.5 * sigma(half)) << "the border";
+    }
   }
 }
 

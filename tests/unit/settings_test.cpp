@@ -20,6 +20,7 @@
 #include "options.hpp"
 #include "settings/aov_table.hpp"
 #include "viewer/c_fields.hpp"
+#include "viewer/c_settings.hpp"
 
 namespace {
 
@@ -140,6 +141,16 @@ TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_display_desc>();
   expect_all_fields<cumulet_camera_desc>();
   expect_all_fields<cumulet_navigation_desc>();
+}
+
+TEST(Settings, ZeroSelectsTheDefaultOfAnEnum) {
+  cumulet_grid_desc grid{};
+  grid.struct_size = sizeof grid;
+  EXPECT_EQ(c_abi::read_settings(&grid).interpolation, CUMULET_INTERPOLATION_NEAREST);
+  grid.interpolation = CUMULET_INTERPOLATION_LINEAR;
+  EXPECT_EQ(c_abi::read_settings(&grid).interpolation, CUMULET_INTERPOLATION_LINEAR);
+  // A scene leaves it to the library.
+  EXPECT_EQ(demo::scene_text(SceneOptions(), "/s.json").find("nearest"), std::string::npos);
 }
 
 TEST(Settings, SceneFilesRoundTripEachSetting) {

@@ -2216,12 +2216,14 @@ typedef enum cumulet_cell_density {
 
 /** The field that voxels stand for. All fields of a volume are interpolated alike. */
 typedef enum cumulet_interpolation {
-  CUMULET_INTERPOLATION_NEAREST = 0, /**< A voxel is a cube of constant value. */
+  CUMULET_INTERPOLATION_AUTO = 0,    /**< The library's default: nearest. A release may choose linear. */
+  CUMULET_INTERPOLATION_NEAREST = 1, /**< A voxel is a cube of constant value. */
   /**
    * A voxel is a sample at its center, with trilinear interpolation between centers. The field ends half a voxel
-   * outside the voxels' box. Ramps and the emission of temperatures apply to voxels. The CPU builds tetrahedral grids.
+   * outside the voxels' box. Ramps and the emission of temperatures apply to voxels. Voxels of GPU-resident dynamic
+   * volumes are read back.
    */
-  CUMULET_INTERPOLATION_LINEAR = 1
+  CUMULET_INTERPOLATION_LINEAR = 2
 } cumulet_interpolation;
 
 /** The refinement criterion: the error indicator that decides which cells are split. */
@@ -2251,8 +2253,8 @@ typedef enum cumulet_build_device {
    * view-independent part once per volume and medium; a camera that moves then needs only the GPU passes.
    *
    * The CPU builds the grid instead, and the log has the reason, in these cases: the grid is larger than the driver's
-   * storage blocks; its build takes more GL memory than there is or than cumulet_limits_desc.gl_bytes allows; it moves
-   * while the shutter is open; or it has linear interpolation.
+   * storage blocks; its build takes more GL memory than there is or than cumulet_limits_desc.gl_bytes allows; or it
+   * moves while the shutter is open.
    */
   CUMULET_BUILD_GPU = 1
 } cumulet_build_device;

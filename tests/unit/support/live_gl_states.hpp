@@ -243,9 +243,18 @@ class LiveStatesOnGpu : public LiveStatesFromGl {
     ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
   }
   // The image of the same values from main memory, made by another viewer.
-  Picture reference(const std::vector<float>& values) {
+  Picture reference(const std::vector<float>& values,
+                    cumulet_interpolation interpolation = CUMULET_INTERPOLATION_NEAREST) {
     const ViewerPtr other = make(CUMULET_BUILD_GPU);
+    if (interpolation != CUMULET_INTERPOLATION_NEAREST) interpolate(other.get(), interpolation);
     return picture_of(other.get(), alone(dense(odd, values)).get(), target_);
+  }
+  // Sets the interpolation of grids that are built on the GPU if possible.
+  static void interpolate(cumulet_viewer* viewer, cumulet_interpolation interpolation) {
+    auto grid = make_desc<cumulet_grid_desc>();
+    grid.build_device = CUMULET_BUILD_GPU;
+    grid.interpolation = interpolation;
+    EXPECT_EQ(cumulet_set_grid(viewer, &grid), CUMULET_OK);
   }
   void hand_over_density(const Array& array, const VoxelType& type) {
     hand_over({in_texture(CUMULET_CHANNEL_DENSITY, odd, objects_.texture(odd, type, array))});
