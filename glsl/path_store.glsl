@@ -10,6 +10,7 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;  // x: full rounds of traversal, or visits of trace_travel.comp; y, z: bits of the tile's changed
                    // bands of rows; w: number of samples whose radiance was not finite
+  uvec4 cm_running;  // work groups of trace.comp: x: that run now; y: the most at once; z: all
   uvec4 cm_blocks[CM_MAX_BLOCKS];   // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
                                     // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
                                     // dispatch

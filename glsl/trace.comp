@@ -36,9 +36,17 @@ void cm_forget_triangles(inout CmPath p) {
   p.found = CM_FOUND_NOT_ASKED;
 }
 
+// Measures how many work groups the device runs at once. The lanes of a group that have a path come first.
+void cm_count_group() {
+  if (gl_LocalInvocationIndex != 0u) return;
+  atomicMax(cm_running.y, atomicAdd(cm_running.x, 1u) + 1u);
+  atomicAdd(cm_running.z, 1u);
+}
+
 void main() {
   uint lane = cm_ranked_lane();
   if (lane >= cm_lanes()) return;
+  cm_count_group();
 #if CM_GROUPS
   cm_group_lane = lane;
 #endif
@@ -64,4 +72,5 @@ void main() {
   if (p.stage != CM_STAGE_DONE && samples == 0u) atomicAdd(cm_blocks[block].z, 1u);
   if (run.finished != 0u) atomicAdd(cm_blocks[block].w, run.finished);
   if (run.marches != 0u) atomicAdd(cm_total.x, (run.marches + CM_EVENTS - 1u) / CM_EVENTS);
+  if (gl_LocalInvocationIndex == 0u) atomicAdd(cm_running.x, 0xffffffffu);
 }

@@ -66,9 +66,11 @@ std::uint32_t Accumulation::pass_after(std::uint32_t samples) const {
   } else if (!settings_.noise_target) {
     // The pass size doubles, so that waiting for slow pixels at a pass's end costs little. If each pixel has a lane,
     // there is one pass: some lanes start their next samples while others are at their first.
-    next = has_lanes_for_all() ? settings_.target_samples : samples + std::clamp(samples, 1U, longest_pass);
+    const bool is_rest = has_lanes_for_all() || (samples > 0 && settings_.target_samples <= settings_.short_picture);
+    next = is_rest ? settings_.target_samples : samples + std::clamp(samples, 1U, longest_pass);
   } else if (samples < first_measured) {
-    next = has_lanes_for_all() ? first_measured : std::max(1U, 2 * samples);
+    const bool is_rest = has_lanes_for_all() || (samples > 0 && first_measured <= settings_.short_picture);
+    next = is_rest ? first_measured : std::max(1U, 2 * samples);
   } else {
     next = look_after(samples);
   }

@@ -42,6 +42,7 @@ std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std:
     const double slots = what.slots + std::ceil(block.unfinished / lanes_per_slot);
     const auto ms = what.cost->most(slots, free);
     if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > what.aim_ms)) break;
+    if (!what.blocks.empty() && lanes > what.cost->resident_lanes().value_or(lanes)) break;
     what.blocks.push_back(static_cast<std::uint32_t>(index));
     what.lanes = lanes;
     what.slots = slots;
@@ -128,6 +129,17 @@ void RoundCost::learn(double slots, double low_ms, double high_ms) {
   for (Known& known : known_) {
     if (known.slots > 0.0) known.ms = std::max(known.ms, low_ms * std::min(1.0, known.slots / slots));
   }
+}
+
+std::optional<double> RoundCost::resident_lanes() const {
+  if (resident_groups_ == 0) return std::nullopt;
+  return double{CM_SQUARE_PIXELS} * resident_groups_;
+}
+
+void RoundCost::learn_groups(std::uint32_t sent, std::uint32_t most) {
+  // Drivers that run on processors have about a group per core, and share them with the host.
+  constexpr std::uint32_t least = 32;
+  if (most < sent && most >= least) resident_groups_ = std::max(resident_groups_, most);
 }
 
 void Reserve::learn(double budget_ms, double taken_ms) {

@@ -30,8 +30,8 @@ constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MAX_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // per lane
 
-// Offsets of cm_next_slot and the fields after it, behind cm_total and cm_blocks.
-constexpr std::size_t next_slot_at = (1 + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
+// Offsets of cm_next_slot and the fields after it, behind the header and cm_blocks.
+constexpr std::size_t next_slot_at = (CM_HEADER_WORDS + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
 constexpr std::size_t squares_at = next_slot_at + sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_at = squares_at + CM_MAX_SQUARES * sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_bytes = std::size_t{CM_LISTS} * CM_MAX_BLOCKS * sizeof(std::uint32_t);

@@ -26,6 +26,7 @@ class PathKernels {
   static constexpr std::uint32_t block_lanes = CM_BLOCK_LANES;
   static constexpr std::uint32_t max_lanes = CM_BLOCK_LANES * CM_MAX_BLOCKS;
   static constexpr std::uint32_t begins_tile = CM_BEGINS;
+  static constexpr std::size_t header_words = CM_HEADER_WORDS;
 
   explicit PathKernels(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 

@@ -21,6 +21,8 @@ class PathSampler {
 
   /// Maximum number of lanes for pictures with these features.
   [[nodiscard]] std::uint32_t max_lanes(const PathFeatures& features) const;
+  /// AccumulationSettings::short_picture without previews.
+  [[nodiscard]] std::uint32_t short_picture() const;
   /// Allocates buffers for this many paths. Throws on a GL error.
   void reserve(const PathFeatures& features, std::uint32_t lanes);
   /// Looks up all programs that a picture is sampled with. measures: it has a noise target.

@@ -74,6 +74,36 @@ TEST(Accumulation, EachPassEndsInEveryTile) {
   EXPECT_EQ(corners, (std::vector<std::uint32_t>{0, 1024, 0, 1024, 0, 1024}));
 }
 
+TEST(Accumulation, ShortPicturesHaveTwoPasses) {
+  const auto passes = [](std::uint32_t samples) {
+    AccumulationSettings quick = settings(wide, samples);
+    quick.short_picture = 32;
+    Accumulation accumulation(quick);
+    std::vector<std::uint32_t> targets;
+    while (!accumulation.done() && targets.size() < 20) {
+      EXPECT_EQ(accumulation.complete(), !targets.empty());
+      targets.push_back(accumulation.pass_target());
+      finish_tile(accumulation);
+      finish_tile(accumulation);  // the other tile
+    }
+    return targets;
+  };
+  EXPECT_EQ(passes(32), (std::vector<std::uint32_t>{1, 32}));
+  // A host may stop a longer picture, whose pixels then have similar numbers of samples.
+  EXPECT_EQ(passes(33), (std::vector<std::uint32_t>{1, 2, 4, 8, 16, 32, 33}));
+}
+
+TEST(Accumulation, MeasuresAfterTwoPassesIfThePictureIsShort) {
+  AccumulationSettings quick = settings(wide, 64);
+  quick.short_picture = 64;
+  quick.noise_target = 0.1;
+  Accumulation accumulation(quick);
+  EXPECT_EQ(accumulation.pass_target(), 1U);
+  finish_tile(accumulation);
+  finish_tile(accumulation);
+  EXPECT_EQ(accumulation.pass_target(), Accumulation::first_measured);
+}
+
 TEST(Accumulation, MoreSamplesContinueADoneOne) {
   Accumulation accumulation(settings(small, 4));
   finish_tile(accumulation, 4 * small_area);
