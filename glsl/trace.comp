@@ -11,6 +11,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "shared.glsl"
 #include "parameters.glsl"
+#if CM_MARCH == 0 && !CM_INSTANCES
+#define CM_KEEPS_ENTRY 1
+#endif
 #include "cell.glsl"
 #include "random.glsl"
 #include "phase.glsl"

@@ -82,6 +82,11 @@ bool Accumulation::has_lanes_for_all() const {
   return tiles_.count == glm::uvec2(1U) && lanes_ >= CM_SQUARE_PIXELS * squares.x * squares.y;
 }
 
+std::uint32_t Accumulation::slots() const {
+  const glm::uvec2 squares = (tiles_.size + Allotment::edge - 1U) / Allotment::edge;
+  return CM_SQUARE_PIXELS * squares.x * squares.y;
+}
+
 bool Accumulation::measures() const {
   // The last pass is measured, too. Whether more samples would have been enough must not depend on when they are
   // requested.

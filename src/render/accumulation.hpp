@@ -95,6 +95,8 @@ class Accumulation {
   [[nodiscard]] const std::vector<std::uint32_t>& squares() const { return squares_; }
   /// Target samples per pixel of the current pass.
   [[nodiscard]] std::uint32_t pass_target() const { return pass_target_; }
+  /// Maximum number of pixel slots of a tile (glsl/pixel_slots.glsl).
+  [[nodiscard]] std::uint32_t slots() const;
   /// Number of lanes.
   [[nodiscard]] std::uint32_t lanes() const { return lanes_; }
   /// Blocks of lanes of the current tile and pass. Dispatches update them, also after the tile has ended.

@@ -43,9 +43,9 @@ std::uint32_t PathSampler::max_lanes(const PathFeatures& features) const {
   return features.has_stages() ? lanes_of_stages : lanes_at_once;
 }
 
-void PathSampler::reserve(const PathFeatures& features, std::uint32_t lanes) {
-  if (!kernels_.reserve(lanes, features.has_stages(), features.grid.several, features.extended_bsdf,
-                        features.light_groups))
+void PathSampler::reserve(const PathFeatures& features, const Accumulation& accumulation) {
+  if (!kernels_.reserve(accumulation.lanes(), accumulation.slots(), features.has_stages(), features.grid.several,
+                        features.extended_bsdf, features.light_groups))
     paths_of_.reset();
 }
 

@@ -74,6 +74,11 @@ TEST(Accumulation, EachPassEndsInEveryTile) {
   EXPECT_EQ(corners, (std::vector<std::uint32_t>{0, 1024, 0, 1024, 0, 1024}));
 }
 
+TEST(Accumulation, HasASlotForEachPixelOfATile) {
+  EXPECT_EQ(Accumulation(settings(small, 1)).slots(), 24U * 16U) << "whole blocks of 8x8 pixels";
+  EXPECT_EQ(Accumulation(settings(wide, 1)).slots(), 1024U * 64U);
+}
+
 TEST(Accumulation, ShortPicturesHaveTwoPasses) {
   const auto passes = [](std::uint32_t samples) {
     AccumulationSettings quick = settings(wide, samples);
