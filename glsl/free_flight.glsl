@@ -155,7 +155,7 @@ CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   vec2 range = cm_box_range(p.o, p.d);
   // Without triangles `reach` is not kept beyond this point, and after a ground hit another dispatch may come in
   // between.
-  float reach = CM_SURFACES == 0 && p.start == CM_ON_GROUND && !cm_is_equiangular(p) ? p.t_end : p.reach;
+  float reach = CM_SURFACES == 0 && cm_on_ground(p) && !cm_is_equiangular(p) ? p.t_end : p.reach;
   p.t = range.x;
   p.t_end = max(0.0f, min(range.y, reach));
   p.cell = uvec2(CM_NONE, 0u);
