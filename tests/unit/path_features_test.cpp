@@ -113,6 +113,17 @@ TEST(PathFeatures, NeedOnlyDeclaredVariantsForEachGrid) {
   }
 }
 
+TEST(PathFeatures, PlainPathsHaveNoGroundAndNoDisk) {
+  PathFeatures features;
+  features.grid = {March::tet, true, 1, false, false};
+  const std::string general = text_of(trace_key(features));
+  EXPECT_EQ(general, "trace.comp, CM_MARCH 0, CM_LINEAR 1, CM_PAGES 1");
+  features.ground_or_disk = false;
+  EXPECT_EQ(text_of(trace_key(features)), general + ", CM_GROUND 0, CM_SUN_DISK 0");
+  features.anisotropic = false;
+  EXPECT_EQ(text_of(trace_key(features)), general + ", CM_GROUND 0, CM_SUN_DISK 0, CM_ISOTROPIC 1");
+}
+
 TEST(PathFeatures, MacrosOfAGridHaveOneOrder) {
   EXPECT_EQ(grid_macros({March::tet, true, 6, true, true}, true),
             (Macros{"CM_MARCH 0", "CM_LINEAR 1", "CM_PAGES 6", "CM_INSTANCES 1", "CM_MOTION 1", "CM_WIDE 1"}));
