@@ -9,6 +9,9 @@
 //   CmEmission cm_march_emission(uvec3 cell, vec3 o, vec3 d)
 //   vec3 cm_march_color(uvec2 cell, vec3 p)        scattering color at point p of cube space in the cell
 //   float cm_march_anisotropy(uvec2 cell, vec3 p)   mean cosine of scattering
+// and with CM_KEEPS_ENTRY
+//   uint cm_kept_cell(uint slot)                  entry cell of the pixel's last camera ray; CM_NONE: unknown
+//   void cm_keep_cell(uint slot, uint cell)
 //
 // Free-flight distances are sampled exactly ("regular tracking" in Novak et al., "Monte Carlo Methods for Volumetric
 // Light Transport Simulation", 2018). An optical depth -ln(1 - u) is used up along the traversal. In a cell the depth
@@ -41,9 +44,24 @@
 #define CM_EVENTS 8
 #endif
 
-// Finds the cell where the ray enters, at p.t.
+#ifndef CM_KEEPS_ENTRY
+#define CM_KEEPS_ENTRY 0
+#endif
+
+// Finds the cell where the ray enters, at p.t. With CM_KEEPS_ENTRY, the entry cell of the pixel's last camera ray is
+// tried first. Most others enter it, too.
 CM_FN void cm_enter(CM_INOUT(CmPath) p) {
+#if CM_KEEPS_ENTRY
+  vec3 point = cm_march_entry(p.o, p.d, p.t);
+  uint kept = p.start == CM_AT_CAMERA ? cm_kept_cell(p.slot) : CM_NONE;
+  uvec3 cell = uvec3(kept, 0u, CM_NONE);
+  if (kept == CM_NONE || !cm_march_contains(kept, point)) {
+    cell = cm_march_enter(point);
+    if (p.start == CM_AT_CAMERA) cm_keep_cell(p.slot, cell.x);
+  }
+#else
   uvec3 cell = cm_march_enter_at(p.o, p.d, p.t);
+#endif
   p.cell = uvec2(cell.x, cell.y);
   p.cache = cell.z;
 }
@@ -137,7 +155,7 @@ CM_FN void cm_aim(CM_INOUT(CmPath) p) {
   vec2 range = cm_box_range(p.o, p.d);
   // Without triangles `reach` is not kept beyond this point, and after a ground hit another dispatch may come in
   // between.
-  float reach = CM_SURFACES == 0 && p.start == CM_ON_GROUND && !cm_is_equiangular(p) ? p.t_end : p.reach;
+  float reach = CM_SURFACES == 0 && cm_on_ground(p) && !cm_is_equiangular(p) ? p.t_end : p.reach;
   p.t = range.x;
   p.t_end = max(0.0f, min(range.y, reach));
   p.cell = uvec2(CM_NONE, 0u);

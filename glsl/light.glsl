@@ -93,10 +93,15 @@ CM_FN CmLightSample cm_sky_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 #endif
 
 // ---- The sun: a disk of uniform radiance. With spread 0 it is a single direction, which no scattered ray reaches.
+// CM_SUN_DISK 0: the spread is 0.
+#ifndef CM_SUN_DISK
+#define CM_SUN_DISK 1
+#endif
 
+CM_FN bool cm_sun_is_disk() { return CM_SUN_DISK != 0 && cm.lights.sun_spread > 0.0f; }
 CM_FN bool cm_on_sun(vec3 w) {
   vec3 apart = w - cm.lights.sun_direction;
-  return dot(apart, apart) < 2.0f * cm.lights.sun_spread;
+  return CM_SUN_DISK != 0 && dot(apart, apart) < 2.0f * cm.lights.sun_spread;
 }
 CM_FN vec3 cm_sun_radiance(vec3 w) { return cm_on_sun(w) ? cm.lights.sun_radiance : vec3(0.0f, 0.0f, 0.0f); }
 CM_FN float cm_sun_pdf(CmLightHit hit) {
@@ -106,7 +111,7 @@ CM_FN float cm_sun_pdf(CmLightHit hit) {
 CM_FN CmLightSample cm_sun_sample(vec3 u) {
   CmLightSample light =
       CmLightSample(CM_LIGHT_SUN, cm.lights.sun_irradiance, cm.lights.sun_direction, 3.0e38f, 1.0f);
-  if (cm.lights.sun_spread > 0.0f) {
+  if (cm_sun_is_disk()) {
     float spread = cm.lights.sun_spread * u.x;
     float sine = sqrt(spread * (2.0f - spread));
     float angle = 6.28318531f * u.y;
@@ -394,7 +399,7 @@ CM_FN CmLightSample cm_light_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 // Returns true if scattered rays reach the light of this sample by escaping.
 #define CM_IS_FAR(NUMBER, PROBABILITY, SAMPLE, PDF, RADIANCE) || light.kind == NUMBER
 CM_FN bool cm_is_far(CmLightSample light) {
-  return (light.kind == CM_LIGHT_SUN && cm.lights.sun_spread > 0.0f) CM_FAR_LIGHTS(CM_IS_FAR);
+  return (light.kind == CM_LIGHT_SUN && cm_sun_is_disk()) CM_FAR_LIGHTS(CM_IS_FAR);
 }
 
 // Fraction of NEE samples of uniform distant light that are worth a shadow ray. Scattered rays also reach that light:

@@ -14,7 +14,8 @@
 #include "march_voxel.glsl"
 #endif
 
-// Entry cell of a ray, o + t d in ray space, at t. The point is clamped to the bounds, however it rounds.
-CM_FN uvec3 cm_march_enter_at(vec3 o, vec3 d, float t) {
-  return cm_march_enter(clamp(cm_in_volume_point(o) + t * cm_in_volume(d), CM_GRID.box_min, CM_GRID.box_max));
+// Point of a ray, o + t d in ray space, where it enters the grid at t. It is clamped to the bounds, however it rounds.
+CM_FN vec3 cm_march_entry(vec3 o, vec3 d, float t) {
+  return clamp(cm_in_volume_point(o) + t * cm_in_volume(d), CM_GRID.box_min, CM_GRID.box_max);
 }
+CM_FN uvec3 cm_march_enter_at(vec3 o, vec3 d, float t) { return cm_march_enter(cm_march_entry(o, d, t)); }

@@ -49,6 +49,21 @@ CM_FN uvec3 cm_march_enter(vec3 p) {
   return uvec3(leaf, 0u, CM_NONE);
 }
 
+// Returns true if point location would find this cell for p, because p is inside the cell by more than rounding. False
+// may also mean that p is too close to a face.
+CM_FN bool cm_march_contains(uint cell, vec3 p) {
+  uvec4 data = cm_record(cell, 1u);
+  bool wide = cm_grid_is_wide();
+  uint shape = cm_record_shape(data, wide);
+  uint cell_class = cm_shape_class(shape);
+  vec3 q = cm_to_frame(p - cm_record_v0(data, wide), shape);
+  float unit = cm_shape_unit(shape);
+  float cap = cell_class == 0u ? 2.0f * unit - q.x - q.y : (cell_class == 1u ? unit - q.x : 2.0f * unit - q.x - q.z);
+  // Both calculations round to 2^-24 of the cube's size a few times.
+  float rounding = uintBitsToFloat((127u - 19u + CM_GRID.root_exponent) << 23);
+  return min(min(q.z, q.x - q.y), min(q.y - q.z, cap)) > rounding;
+}
+
 // A ray in cube space, with data that the traversal precomputes.
 struct CmMarchRay {
   vec3 o;

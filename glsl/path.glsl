@@ -121,7 +121,7 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   uint layer = (pixel.y >> 16) + sample_number;
   p.reach = t_per_z * cm_camera_end(p, at, within, layer, along.y);
   float ground = cm_ground_distance(p.o, p.d);
-  p.to_ground = ground < min(p.reach, CM_NO_GROUND) ? 1u : 0u;
+  p.to_ground = cm_ground_ends(ground, p.reach) ? 1u : 0u;
   if (p.to_ground != 0u) p.at_layer = 0u;
   p.reach = min(p.reach, ground);
   p.stage = CM_STAGE_AIM;
@@ -296,8 +296,9 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
   p.depth_0 = cm_free_depth(nee.draw.u_distance) + (to_light ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
   float ground = cm_ground_distance(p.o, p.d);
-  p.to_ground = !to_light && ground < light.distance ? 1u : 0u;
-  bool hidden = to_light && ground < light.distance;
+  bool ground_ends = cm_ground_ends(ground, light.distance);
+  p.to_ground = !to_light && ground_ends ? 1u : 0u;
+  bool hidden = to_light && ground_ends;
   if (hidden) p.light = vec3(0.0f, 0.0f, 0.0f);
   p.reach = hidden ? 0.0f : min(light.distance, ground);
 #if CM_INSTANCES
@@ -308,10 +309,10 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
 #endif
   if (CM_SURFACES == 0) {
     p.t = 0.0f;
-    p.t_end = p.start == CM_ON_GROUND ? p.reach : min(cm_box_range(p.o, p.d).y, p.reach);
+    p.t_end = cm_on_ground(p) ? p.reach : min(cm_box_range(p.o, p.d).y, p.reach);
     p.cell = p.start_cell;
     p.cache = CM_NONE;
-    p.stage = p.start == CM_ON_GROUND ? CM_STAGE_AIM : CM_STAGE_FLY;
+    p.stage = cm_on_ground(p) ? CM_STAGE_AIM : CM_STAGE_FLY;
   } else {
     if (to_light && !cm_is_positive(max(p.light.x, max(p.light.y, p.light.z)))) p.reach = 0.0f;  // no light
     p.stage = CM_STAGE_AIM;
@@ -323,7 +324,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
 CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived) {
   bool scattered = p.ray == CM_RAY_SCATTERED;
   bool hit_triangle = vertex.on_triangle && scattered;
-  bool grounded = scattered && p.event == CM_EVENT_ESCAPE && !hit_triangle && p.to_ground != 0u;
+  bool grounded = scattered && p.event == CM_EVENT_ESCAPE && !hit_triangle && cm_goes_to_ground(p);
   bool escaped = p.event == CM_EVENT_ESCAPE && !hit_triangle && !grounded;
   bool collided = scattered && p.event == CM_EVENT_COLLISION && !hit_triangle;
 #if CM_INSTANCES

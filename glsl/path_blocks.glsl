@@ -8,6 +8,7 @@
 #define CM_BEGINS 0x80000000u  // flag beside a block's number: a tile begins
 #define CM_LIST_BIT 16         // bit offset beside a block's number: its list to read (compaction); the next is written
 #define CM_LISTS 3u
+#define CM_HEADER_WORDS 2u  // of the counters, in uvec4: cm_total and cm_running
 #define CM_SQUARE_EDGE 8u
 #define CM_SQUARE_PIXELS 64u
 #define CM_MAX_SQUARES 16384u  // per tile

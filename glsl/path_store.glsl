@@ -10,13 +10,15 @@ layout(std430, binding = CM_STORAGE_PATHS) buffer CmPaths { uvec4 cm_paths[]; };
 layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uvec4 cm_total;  // x: full rounds of traversal, or visits of trace_travel.comp; y, z: bits of the tile's changed
                    // bands of rows; w: number of samples whose radiance was not finite
+  uvec4 cm_running;  // work groups of trace.comp: x: that run now; y: the most at once; z: all
   uvec4 cm_blocks[CM_MAX_BLOCKS];   // x: numbers of the dispatch's blocks, with CM_BEGINS. Per block: y: lanes that
                                     // have a pixel; z: lanes whose pixel has no sample; w: samples finished in this
                                     // dispatch
   uint cm_next_slot;               // first unused pixel slot
   uint cm_squares[CM_MAX_SQUARES];  // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
   uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];  // per list and block: number of lanes with a path
-  uint cm_active_paths[];  // per list: lanes of all blocks; in each block the active lanes come first
+  uint cm_words[];  // per pixel slot: entry cell of its last camera ray, plus one; 0: unknown. Then per list: lanes of all
+                    // blocks; in each block the active lanes come first
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
@@ -162,16 +164,18 @@ uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
 // are three lists in rotation. Each dispatch reads the list that the block's last dispatch wrote, writes the next one
 // and clears the third.
 uint cm_list(uint ahead) { return (bitfieldExtract(cm_blocks[gl_WorkGroupID.y].x, CM_LIST_BIT, 2) + ahead) % CM_LISTS; }
+// Index of the block's first word in a list.
+uint cm_list_at(uint list) { return cm.dispatch.slots + list * cm_lanes() + cm_block() * CM_BLOCK_LANES; }
 uint cm_ranked_lane() {
   if (cm_index_in_block() == 0u) cm_active_counts[cm_list(2u) * CM_MAX_BLOCKS + cm_block()] = 0u;
   if (cm_block_begins()) return cm_block_lane();
   if (cm_index_in_block() >= cm_active_counts[cm_list(0u) * CM_MAX_BLOCKS + cm_block()]) return cm_lanes();
-  return cm_active_paths[cm_list(0u) * cm_lanes() + cm_block_lane()];
+  return cm_words[cm_list_at(cm_list(0u)) + cm_index_in_block()];
 }
 // Adds the lane to the list of the next dispatch.
 void cm_join_ranks(uint lane) {
   uint rank = atomicAdd(cm_active_counts[cm_list(1u) * CM_MAX_BLOCKS + cm_block()], 1u);
-  cm_active_paths[cm_list(1u) * cm_lanes() + cm_block() * CM_BLOCK_LANES + rank] = lane;
+  cm_words[cm_list_at(cm_list(1u)) + rank] = lane;
 }
 
 #endif

@@ -68,7 +68,19 @@ CM_FN float cm_anisotropy(CmPath p) {
   return CM_MEDIUM.anisotropy;
 }
 
-#if CM_SECOND_LOBE
+// CM_ISOTROPIC 1: the anisotropy is 0, and there is no second lobe.
+#ifndef CM_ISOTROPIC
+#define CM_ISOTROPIC 0
+#endif
+
+CM_FN bool cm_on_ground(CmPath p) { return CM_GROUND != 0 && p.start == CM_ON_GROUND; }
+// Returns true if the ray hits the ground, unless something blocks it.
+CM_FN bool cm_goes_to_ground(CmPath p) { return CM_GROUND != 0 && p.to_ground != 0u; }
+
+#if CM_ISOTROPIC
+CM_FN float cm_medium_phase(float g, float cosine) { return CM_ISOTROPIC_PHASE; }
+CM_FN float cm_medium_cosine(float g, float u) { return 1.0f - 2.0f * u; }
+#elif CM_SECOND_LOBE
 CM_FN CmPhase cm_lobes(float anisotropy) {
   CmPhase phase;
   phase.anisotropy = anisotropy;
@@ -87,10 +99,10 @@ CM_FN float cm_medium_cosine(float g, float u) { return cm_henyey_greenstein_cos
 // Fraction of the light not absorbed that is scattered into wi, in the medium or on the ground, per solid angle. This
 // is also the pdf of the sampled directions.
 CM_FN float cm_scattered(CmPath p, vec3 wi) {
-  return p.start == CM_ON_GROUND ? max(0.0f, wi.y) * 0.318309886f : cm_medium_phase(cm_anisotropy(p), dot(p.w, wi));
+  return cm_on_ground(p) ? max(0.0f, wi.y) * 0.318309886f : cm_medium_phase(cm_anisotropy(p), dot(p.w, wi));
 }
 CM_FN vec3 cm_scattered_direction(CmPath p, float u_0, float u_1) {
-  bool ground = p.start == CM_ON_GROUND;
+  bool ground = cm_on_ground(p);
   return cm_around(ground ? vec3(0.0f, 1.0f, 0.0f) : p.w,
                    ground ? sqrt(1.0f - u_0) : cm_medium_cosine(cm_anisotropy(p), u_0), 6.28318531f * u_1);
 }

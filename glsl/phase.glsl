@@ -13,11 +13,12 @@ struct CmPhase {
   float second_weight;
 };
 
+#define CM_ISOTROPIC_PHASE 0.0795774715f
 CM_FN float cm_henyey_greenstein(float g, float cosine) {
   // 1 + g^2 - 2 g cosine, which is never 0, without the cancellation.
   float k = abs(g);
   float d = (1.0f - k) * (1.0f - k) + 2.0f * max(0.0f, k - g * cosine);
-  return 0.0795774715f * (1.0f - g * g) / (d * sqrt(d));
+  return CM_ISOTROPIC_PHASE * (1.0f - g * g) / (d * sqrt(d));
 }
 
 CM_FN float cm_draine(float g, float bend, float cosine) {

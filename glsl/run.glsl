@@ -26,7 +26,7 @@ CM_FN CmRun cm_run(CM_INOUT(CmPath) p, CM_INOUT(uint) samples, uint rounds) {
       cm_aim(p);
       if (CM_INSTANCES == 0 && p.cell.x == CM_NONE) {
         p.event = CM_EVENT_ESCAPE;
-        bool ends = !cm_is_equiangular(p) && p.start == CM_AT_CAMERA && p.to_ground == 0u;
+        bool ends = !cm_is_equiangular(p) && p.start == CM_AT_CAMERA && !cm_goes_to_ground(p);
         p.stage = ends ? CM_STAGE_FINISH : CM_STAGE_EVENT;
       }
     }

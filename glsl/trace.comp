@@ -2,7 +2,7 @@
 // The path tracer as a megakernel, for scenes without triangles. Each lane of the dispatch's blocks loads its path,
 // runs it for a bounded number of rounds and stores it.
 // variants: VOLUME or VOLUMES or VOLUMES CM_HOLDOUT=1 or VOLUMES CM_HOLDOUT=1 CM_MOTION=1
-// variants: - or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_ANALYTIC_LIGHTS=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 or CM_ANALYTIC_LIGHTS=1 CM_AOVS=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 CM_AOVS=1 or CM_ANALYTIC_LIGHTS=1 CM_EQUIANGULAR=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 CM_GROUPS=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 CM_AOVS=1 CM_GROUPS=1 or CM_ANALYTIC_LIGHTS=1 CM_EQUIANGULAR=1 CM_GROUPS=1
+// variants: - or CM_GROUND=0 CM_SUN_DISK=0 or CM_GROUND=0 CM_SUN_DISK=0 CM_ISOTROPIC=1 or CM_LAYERS=1 or CM_AOVS=1 or CM_LAYERS=1 CM_AOVS=1 or CM_ANALYTIC_LIGHTS=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 or CM_ANALYTIC_LIGHTS=1 CM_AOVS=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 CM_AOVS=1 or CM_ANALYTIC_LIGHTS=1 CM_EQUIANGULAR=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 CM_GROUPS=1 or CM_ANALYTIC_LIGHTS=1 CM_LAYERS=1 CM_AOVS=1 CM_GROUPS=1 or CM_ANALYTIC_LIGHTS=1 CM_EQUIANGULAR=1 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
@@ -11,6 +11,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "bindings.glsl"
 #include "shared.glsl"
 #include "parameters.glsl"
+#if CM_MARCH == 0 && !CM_INSTANCES
+#define CM_KEEPS_ENTRY 1
+#endif
 #include "cell.glsl"
 #include "random.glsl"
 #include "phase.glsl"
@@ -36,9 +39,17 @@ void cm_forget_triangles(inout CmPath p) {
   p.found = CM_FOUND_NOT_ASKED;
 }
 
+// Measures how many work groups the device runs at once. The lanes of a group that have a path come first.
+void cm_count_group() {
+  if (gl_LocalInvocationIndex != 0u) return;
+  atomicMax(cm_running.y, atomicAdd(cm_running.x, 1u) + 1u);
+  atomicAdd(cm_running.z, 1u);
+}
+
 void main() {
   uint lane = cm_ranked_lane();
   if (lane >= cm_lanes()) return;
+  cm_count_group();
 #if CM_GROUPS
   cm_group_lane = lane;
 #endif
@@ -64,4 +75,5 @@ void main() {
   if (p.stage != CM_STAGE_DONE && samples == 0u) atomicAdd(cm_blocks[block].z, 1u);
   if (run.finished != 0u) atomicAdd(cm_blocks[block].w, run.finished);
   if (run.marches != 0u) atomicAdd(cm_total.x, (run.marches + CM_EVENTS - 1u) / CM_EVENTS);
+  if (gl_LocalInvocationIndex == 0u) atomicAdd(cm_running.x, 0xffffffffu);
 }

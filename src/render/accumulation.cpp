@@ -36,6 +36,7 @@ Accumulation::Accumulation(const AccumulationSettings& settings)
   tiles_.count = (box().size + tiles_.size - 1U) / tiles_.size;
   const glm::uvec2 squares = tile_squares();
   lanes_ = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, settings.max_lanes);
+  max_lanes_ = lanes_;
   pass_target_ = pass_after(0);
   allotment_.begin(box().size);
   expectation_.expected_samples = allotment_.expected(target_samples());
@@ -66,9 +67,11 @@ std::uint32_t Accumulation::pass_after(std::uint32_t samples) const {
   } else if (!settings_.noise_target) {
     // The pass size doubles, so that waiting for slow pixels at a pass's end costs little. If each pixel has a lane,
     // there is one pass: some lanes start their next samples while others are at their first.
-    next = has_lanes_for_all() ? settings_.target_samples : samples + std::clamp(samples, 1U, longest_pass);
+    const bool is_rest = has_lanes_for_all() || (samples > 0 && settings_.target_samples <= settings_.short_picture);
+    next = is_rest ? settings_.target_samples : samples + std::clamp(samples, 1U, longest_pass);
   } else if (samples < first_measured) {
-    next = has_lanes_for_all() ? first_measured : std::max(1U, 2 * samples);
+    const bool is_rest = has_lanes_for_all() || (samples > 0 && first_measured <= settings_.short_picture);
+    next = is_rest ? first_measured : std::max(1U, 2 * samples);
   } else {
     next = look_after(samples);
   }
@@ -78,6 +81,11 @@ std::uint32_t Accumulation::pass_after(std::uint32_t samples) const {
 bool Accumulation::has_lanes_for_all() const {
   const glm::uvec2 squares = tile_squares();
   return tiles_.count == glm::uvec2(1U) && lanes_ >= CM_SQUARE_PIXELS * squares.x * squares.y;
+}
+
+std::uint32_t Accumulation::slots() const {
+  const glm::uvec2 squares = (tiles_.size + Allotment::edge - 1U) / Allotment::edge;
+  return CM_SQUARE_PIXELS * squares.x * squares.y;
 }
 
 bool Accumulation::measures() const {
@@ -131,7 +139,13 @@ void Accumulation::go_on_from(const Accumulated& counts, std::optional<std::uint
   begin_tile();
 }
 
+void Accumulation::limit_lanes(std::uint32_t lanes) {
+  if (has_lanes_for_all()) return;
+  max_lanes_ = std::min(lanes_, std::max(min_lanes, lanes / block_lanes * block_lanes));
+}
+
 void Accumulation::begin_tile() {
+  lanes_ = max_lanes_;
   // In-flight dispatches update the blocks that they were sent for, which are not read any more.
   blocks_ = std::make_shared<Blocks>();
   squares_.clear();

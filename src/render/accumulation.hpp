@@ -30,6 +30,7 @@ struct AccumulationSettings {
   std::uint32_t target_samples = 1;
   std::uint32_t max_lanes = 1;
   bool previews_first = false;           // PictureOptions::preview
+  std::uint32_t short_picture = 0;       // maximum samples per pixel of a pass that begins at the first sample
   std::optional<double> noise_target{};  // PictureSettings::noise_target
   bool adaptive = false;                 // pixels are sampled only as much as the noise target needs
 };
@@ -40,9 +41,10 @@ struct AccumulationSettings {
 /// pixel is done takes another pixel (persistent threads). A dispatch runs some blocks of lanes, those that have work.
 /// In a dispatch a lane runs a bounded number of rounds and keeps its path for the next dispatch.
 /// Samples come in passes: each pass ends in every tile before the next begins. A picture with a lane for every pixel
-/// has one pass.
-/// Each pixel belongs to one lane at a time and adds its samples in order. A sample that is started again gives the
-/// same result. So the image depends only on parameters and sample count, not on tiles, lanes, budgets, timing, or when
+/// has one pass. A picture of few samples that nothing waits for has two (AccumulationSettings::short_picture), because
+/// a pass ends with its slowest pixels. Its first pass has one sample per pixel, so that it is soon complete. Each
+/// pixel belongs to one lane at a time and adds its samples in order. A sample that is started again gives the same
+/// result. So the image depends only on parameters and sample count, not on tiles, lanes, budgets, timing, or when
 /// results of dispatches arrive.
 class Accumulation {
  public:
@@ -93,8 +95,12 @@ class Accumulation {
   [[nodiscard]] const std::vector<std::uint32_t>& squares() const { return squares_; }
   /// Target samples per pixel of the current pass.
   [[nodiscard]] std::uint32_t pass_target() const { return pass_target_; }
+  /// Maximum number of pixel slots of a tile (glsl/pixel_slots.glsl).
+  [[nodiscard]] std::uint32_t slots() const;
   /// Number of lanes.
   [[nodiscard]] std::uint32_t lanes() const { return lanes_; }
+  /// Limits the number of lanes of later tiles and passes, if there are fewer lanes than pixels.
+  void limit_lanes(std::uint32_t lanes);
   /// Blocks of lanes of the current tile and pass. Dispatches update them, also after the tile has ended.
   [[nodiscard]] const std::shared_ptr<Blocks>& blocks() const { return blocks_; }
   /// Finished samples. Dispatches update the count, also after the picture was restarted.
@@ -148,6 +154,7 @@ class Accumulation {
   AccumulationSettings settings_;
   Tiles tiles_;
   std::uint32_t lanes_ = 0;
+  std::uint32_t max_lanes_ = 0;  // of the next tile
   std::shared_ptr<Blocks> blocks_;
   std::size_t next_block_ = 0;
   std::uint32_t pass_target_ = 1;

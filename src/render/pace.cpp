@@ -130,6 +130,17 @@ void RoundCost::learn(double slots, double low_ms, double high_ms) {
   }
 }
 
+std::optional<std::uint32_t> RoundCost::resident_lanes() const {
+  if (resident_groups_ == 0) return std::nullopt;
+  return CM_SQUARE_PIXELS * resident_groups_;
+}
+
+void RoundCost::learn_groups(std::uint32_t sent, std::uint32_t most) {
+  // Drivers that run on processors have about a group per core, and share them with the host.
+  constexpr std::uint32_t least = 32;
+  if (most < sent && most >= least) resident_groups_ = std::max(resident_groups_, most);
+}
+
 void Reserve::learn(double budget_ms, double taken_ms) {
   constexpr double late_at = 1.15;
   constexpr double may_be_late = 0.05;

@@ -27,6 +27,12 @@ class RoundCost {
   /// drivers compile in it.
   void learn(double slots, double low_ms, double high_ms);
 
+  /// Returns the number of lanes that the device runs at once; nullopt if no dispatch had more. Further lanes wait
+  /// until others end, in a second wave that fills the device only partly.
+  [[nodiscard]] std::optional<std::uint32_t> resident_lanes() const;
+  /// Records that of `sent` work groups with paths at most `most` ran at once.
+  void learn_groups(std::uint32_t sent, std::uint32_t most);
+
  private:
   struct Known {
     double slots = 0.0;
@@ -36,6 +42,7 @@ class RoundCost {
   std::array<Known, 32> known_;  // indexed by log2 of slots
   bool warm_ = false;
   double last_ratio_ = 0.0;  // of the last dispatch: its minimum time over the estimated maximum
+  std::uint32_t resident_groups_ = 0;
 };
 
 /// Fraction of a time budget to hold back, so that about 95 % of the calls end within the budget. The host's own work

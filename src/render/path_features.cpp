@@ -102,6 +102,13 @@ PathFeatures path_features(const MarchData& data, const PictureParameters& param
   features.equiangular = features.analytic_lights && parameters.equiangular && !features.separate_volume_aov &&
                          !features.extended_bsdf && !features.volume_holdout && !features.model_holdout &&
                          (features.has_stages() || features.layered == Layered::no);
+  // To limit the number of variants, only the most frequent kernels have others for these.
+  const bool plain = shaded && !options.preview && !features.has_stages() && !features.channels &&
+                     !features.analytic_lights && !features.separate_volume_aov && features.light_groups == 0 &&
+                     features.layered == Layered::no;
+  features.ground_or_disk = !plain || parameters.ground.reach > 0.0F || parameters.lights.sun_spread > 0.0F;
+  features.anisotropic =
+      features.ground_or_disk || features.grid.several || features.second_lobe || medium.anisotropy != 0.0F;
   return features;
 }
 
@@ -119,6 +126,11 @@ gl::ProgramKey trace_key(const PathFeatures& features) {
   const bool groups = features.light_groups > 0;
   if (features.layered != Layered::no || (groups && !features.equiangular)) more.push_back(macros::layers(1));
   if (features.separate_volume_aov) more.push_back(macros::aovs(1));
+  if (!features.ground_or_disk) {
+    more.push_back(macros::ground(0));
+    more.push_back(macros::sun_disk(0));
+  }
+  if (!features.anisotropic) more.push_back(macros::isotropic(1));
   add_medium(features, more);
   if (features.environment) more.push_back(macros::environment(1));
   if (features.analytic_lights || groups) more.push_back(macros::analytic_lights(1));

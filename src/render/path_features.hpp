@@ -54,6 +54,9 @@ struct PathFeatures {
   bool model_holdout = false;
   bool motion = false;  // something moves while the shutter is open
   bool separate_volume_aov = false;
+  // In pictures with previews these do not depend on the scene, so that changes of it need no other program.
+  bool ground_or_disk = true;  // there is a ground, or the sun is a disk
+  bool anisotropic = true;     // the phase function has more than one value
 
   /// True if paths run in wavefront stages; else in one kernel.
   [[nodiscard]] bool has_stages() const { return triangles != PathTriangles::none; }

@@ -30,27 +30,27 @@ constexpr std::size_t head_bytes = sizeof(glm::uvec4);
 constexpr std::size_t heads_bytes = std::size_t{CM_QUEUES} * (CM_MAX_ROUNDS + 1) * head_bytes;
 constexpr std::size_t queue_bytes = (std::size_t{CM_QUEUES} + 1) * sizeof(std::uint32_t);  // per lane
 
-// Offsets of cm_next_slot and the fields after it, behind cm_total and cm_blocks.
-constexpr std::size_t next_slot_at = (1 + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
+// Offsets of cm_next_slot and the fields after it, behind the header and cm_blocks.
+constexpr std::size_t next_slot_at = (CM_HEADER_WORDS + CM_MAX_BLOCKS) * sizeof(glm::uvec4);
 constexpr std::size_t squares_at = next_slot_at + sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_at = squares_at + CM_MAX_SQUARES * sizeof(std::uint32_t);
 constexpr std::size_t rank_counts_bytes = std::size_t{CM_LISTS} * CM_MAX_BLOCKS * sizeof(std::uint32_t);
-constexpr std::size_t blocks_bytes(std::size_t lanes) {
-  return rank_counts_at + rank_counts_bytes + CM_LISTS * lanes * sizeof(std::uint32_t);
+constexpr std::size_t blocks_bytes(std::size_t list_words) {
+  return rank_counts_at + rank_counts_bytes + list_words * sizeof(std::uint32_t);
 }
 
 }  // namespace
 
-bool PathKernels::reserve(std::size_t lanes, bool stages, bool visits, bool within, std::uint32_t groups) {
+bool PathKernels::reserve(std::size_t lanes, std::size_t slots, bool stages, bool visits, bool within,
+                          std::uint32_t groups) {
   bool kept = true;
-  const std::size_t ranked_lanes = stages ? 0 : lanes;  // stages use queues instead
-  if (!blocks_ || ranked_lanes > ranked_lanes_) {
+  const std::size_t list_words = slots + (stages ? 0 : CM_LISTS * lanes);  // stages use queues instead
+  if (!blocks_ || list_words > list_words_) {
     kept = false;
     blocks_ = {};
-    ranked_lanes_ = 0;
-    blocks_ =
-        gl::make_buffer(gl_, blocks_bytes(ranked_lanes), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
-    ranked_lanes_ = ranked_lanes;
+    list_words_ = 0;
+    blocks_ = gl::make_buffer(gl_, blocks_bytes(list_words), nullptr, GL_DYNAMIC_STORAGE_BIT, "creating the counters");
+    list_words_ = list_words;
   }
   const std::size_t path_bytes = lanes * lane_bytes(visits, within, groups);
   if (path_bytes > path_bytes_) {
@@ -83,7 +83,9 @@ void PathKernels::set_counters(std::span<const glm::uvec4> words) const {
 void PathKernels::set_squares(std::span<const std::uint32_t> squares, std::uint32_t lanes) const {
   gl_->NamedBufferSubData(blocks_.name(), next_slot_at, sizeof lanes, &lanes);
   gl_->NamedBufferSubData(blocks_.name(), squares_at, static_cast<GLsizeiptr>(squares.size_bytes()), squares.data());
-  gl_->ClearNamedBufferSubData(blocks_.name(), GL_R32UI, rank_counts_at, rank_counts_bytes, GL_RED_INTEGER,
+  const std::size_t slots = CM_SQUARE_PIXELS * squares.size();
+  gl_->ClearNamedBufferSubData(blocks_.name(), GL_R32UI, rank_counts_at,
+                               static_cast<GLsizeiptr>(blocks_bytes(slots) - rank_counts_at), GL_RED_INTEGER,
                                GL_UNSIGNED_INT, nullptr);
 }
 
@@ -119,7 +121,7 @@ void PathKernels::run_stages(const StagePrograms& programs, std::uint32_t lanes,
 std::uint32_t PathKernels::max_rounds() { return CM_MAX_ROUNDS; }
 
 std::uint64_t PathKernels::bytes() const {
-  return path_bytes_ + (blocks_ ? blocks_bytes(ranked_lanes_) : 0) +
+  return path_bytes_ + (blocks_ ? blocks_bytes(list_words_) : 0) +
          (queues_ ? heads_bytes + queues_lanes_ * queue_bytes : 0);
 }
 

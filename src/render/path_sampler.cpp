@@ -19,6 +19,9 @@ constexpr std::uint32_t lanes_at_once = 128 * block_lanes;
 constexpr std::uint32_t lanes_of_stages = PathKernels::max_lanes;
 constexpr std::uint32_t lanes_in_call = Accumulation::min_lanes;
 static_assert(CM_MAX_SQUARES <= InFlightDispatches::max_words, "the squares must fit into one read-back");
+// Such a picture takes a device less than a second. On a processor a host may stop earlier, so pixels must have similar
+// numbers of samples.
+constexpr std::uint32_t short_picture_samples = 64;
 // llvmpipe silently ends a shader's loops after 65,535 iterations in total. This constant bounds the iterations of a
 // dispatch: a round takes some hundred.
 constexpr std::uint32_t max_rounds = 256;
@@ -33,14 +36,16 @@ std::size_t far_step(std::size_t n) {
 
 }  // namespace
 
+std::uint32_t PathSampler::short_picture() const { return gl_->dispatches_in_call ? 0 : short_picture_samples; }
+
 std::uint32_t PathSampler::max_lanes(const PathFeatures& features) const {
   if (gl_->dispatches_in_call) return lanes_in_call;
   return features.has_stages() ? lanes_of_stages : lanes_at_once;
 }
 
-void PathSampler::reserve(const PathFeatures& features, std::uint32_t lanes) {
-  if (!kernels_.reserve(lanes, features.has_stages(), features.grid.several, features.extended_bsdf,
-                        features.light_groups))
+void PathSampler::reserve(const PathFeatures& features, const Accumulation& accumulation) {
+  if (!kernels_.reserve(accumulation.lanes(), accumulation.slots(), features.has_stages(), features.grid.several,
+                        features.extended_bsdf, features.light_groups))
     paths_of_.reset();
 }
 
@@ -102,6 +107,7 @@ bool PathSampler::accumulate(Picture& picture, const MarchData& data, const Trac
       break;
     }
     dispatches_.collect();
+    if (const auto lanes = kernels.program.cost->resident_lanes()) accumulation.limit_lanes(*lanes);
     accumulation.end_tile();
   }
   return accumulation.done();
@@ -170,10 +176,11 @@ void PathSampler::dispatch(Picture& picture, const TraceInputs& trace_inputs, co
   for (std::size_t i = 0; i < count; ++i) dealt[i] = what.blocks[i * step % count];
   what.blocks = std::move(dealt);
   std::uint32_t lanes_a_block = 0;
-  std::vector<glm::uvec4> words(1 + blocks->size(), glm::uvec4(0U));
+  constexpr std::size_t header = PathKernels::header_words;
+  std::vector<glm::uvec4> words(header + blocks->size(), glm::uvec4(0U));
   for (std::size_t i = 0; i < count; ++i) {
     Block& block = (*blocks)[what.blocks[i]];
-    words[1 + i].x = what.blocks[i] | block.list << CM_LIST_BIT | (block.begins ? PathKernels::begins_tile : 0U);
+    words[header + i].x = what.blocks[i] | block.list << CM_LIST_BIT | (block.begins ? PathKernels::begins_tile : 0U);
     lanes_a_block = std::max(lanes_a_block, block.begins ? block_lanes : block.unfinished);
     block.begins = false;
     block.list = (block.list + 1) % CM_LISTS;

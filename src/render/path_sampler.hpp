@@ -21,8 +21,10 @@ class PathSampler {
 
   /// Maximum number of lanes for pictures with these features.
   [[nodiscard]] std::uint32_t max_lanes(const PathFeatures& features) const;
-  /// Allocates buffers for this many paths. Throws on a GL error.
-  void reserve(const PathFeatures& features, std::uint32_t lanes);
+  /// AccumulationSettings::short_picture without previews.
+  [[nodiscard]] std::uint32_t short_picture() const;
+  /// Allocates buffers for the paths of the accumulation. Throws on a GL error.
+  void reserve(const PathFeatures& features, const Accumulation& accumulation);
   /// Looks up all programs that a picture is sampled with. measures: it has a noise target.
   void find_programs(const PathFeatures& features, bool measures);
   /// Samples until about the deadline, and may return with dispatches in flight. Parameters are those of

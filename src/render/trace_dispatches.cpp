@@ -9,6 +9,13 @@
 
 namespace cumulet::render {
 
+namespace {
+
+// In shorter dispatches some work groups may end before others begin.
+constexpr std::uint32_t telling_rounds = 16;
+
+}  // namespace
+
 void TraceDispatches::allocate() {
   if (!parameters_)
     parameters_ =
@@ -51,8 +58,11 @@ void TraceDispatches::collect() {
 void TraceDispatches::collect_samples(const InFlightDispatches::Completed& completed) {
   const Dispatched& what = completed.what;
   learn(what, completed.ms, completed.at_most_ms, completed.words[0].x);
+  if (!gl_->dispatches_in_call && what.rounds >= telling_rounds)
+    what.cost->learn_groups(completed.words[1].z, completed.words[1].y);
   what.rows->change(what.first_row, completed.words[0].y, completed.words[0].z, what.revision);
-  for (const std::uint32_t block : what.blocks) what.samples->finished += completed.words[1 + block].w;
+  for (const std::uint32_t block : what.blocks)
+    what.samples->finished += completed.words[PathKernels::header_words + block].w;
   what.samples->not_finite += completed.words[0].w;
   if (log_ != nullptr) {
     const double ms = completed.ms.value_or(completed.at_most_ms);
@@ -61,8 +71,9 @@ void TraceDispatches::collect_samples(const InFlightDispatches::Completed& compl
   }
   for (const std::uint32_t index : what.blocks) {
     Block& block = (*what.tile)[index];
-    block.unfinished = completed.words[1 + index].y;
-    block.empty = completed.words[1 + index].z;
+    const glm::uvec4& counts = completed.words[PathKernels::header_words + index];
+    block.unfinished = counts.y;
+    block.empty = counts.z;
     --block.under_way;
   }
 }

@@ -59,9 +59,10 @@ void Tracer::begin(Picture& picture, const MarchData& data, const PictureParamet
                              .target_samples = samples,
                              .max_lanes = sampler_.max_lanes(features),
                              .previews_first = options.preview,
+                             .short_picture = options.preview ? 0 : sampler_.short_picture(),
                              .noise_target = noise_target,
                              .adaptive = noise_target && options.adaptive});
-  if (shaded) sampler_.reserve(features, accumulation.lanes());
+  if (shaded) sampler_.reserve(features, accumulation);
   find_programs(features, noise_target.has_value(), data, trace_inputs);
   core::CmParameters kernel = kernel_parameters(parameters, trace_inputs);
   kernel.integrator.groups = features.light_groups;

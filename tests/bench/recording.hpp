@@ -31,7 +31,11 @@ struct RecordingData {
     if (march) march(cell);
     return grid->cells[cell].links;
   }
-  uint cm_tree(uint node) const { return grid->tree[node]; }
+  mutable uint levels = 0;  // number of tree nodes that were read
+  uint cm_tree(uint node) const {
+    ++levels;
+    return grid->tree[node];
+  }
   uint cm_root_leaf(uint root) const { return grid->roots[root].first_leaf; }
   uint cm_root_node(uint root) const { return grid->roots[root].first_internal; }
 };

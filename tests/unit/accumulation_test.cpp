@@ -74,6 +74,59 @@ TEST(Accumulation, EachPassEndsInEveryTile) {
   EXPECT_EQ(corners, (std::vector<std::uint32_t>{0, 1024, 0, 1024, 0, 1024}));
 }
 
+TEST(Accumulation, LaterPassesHaveAsManyLanesAsTheDeviceRuns) {
+  AccumulationSettings many = settings(wide, 4);
+  many.max_lanes = 48 * CM_BLOCK_LANES;
+  Accumulation accumulation(many);
+  ASSERT_EQ(accumulation.lanes(), 48 * CM_BLOCK_LANES);
+  accumulation.limit_lanes(40 * CM_BLOCK_LANES + 64);
+  EXPECT_EQ(accumulation.lanes(), 48 * CM_BLOCK_LANES) << "the lanes of the tile have paths";
+  finish_tile(accumulation);
+  EXPECT_EQ(accumulation.lanes(), 40 * CM_BLOCK_LANES);
+  accumulation.limit_lanes(1000);
+  finish_tile(accumulation);
+  EXPECT_EQ(accumulation.lanes(), Accumulation::min_lanes);
+  Accumulation has_a_lane_for_each_pixel(settings(small, 4));
+  has_a_lane_for_each_pixel.limit_lanes(64);
+  has_a_lane_for_each_pixel.begin_tile();
+  EXPECT_EQ(has_a_lane_for_each_pixel.lanes(), 384U);
+}
+
+TEST(Accumulation, HasASlotForEachPixelOfATile) {
+  EXPECT_EQ(Accumulation(settings(small, 1)).slots(), 24U * 16U) << "whole blocks of 8x8 pixels";
+  EXPECT_EQ(Accumulation(settings(wide, 1)).slots(), 1024U * 64U);
+}
+
+TEST(Accumulation, ShortPicturesHaveTwoPasses) {
+  const auto passes = [](std::uint32_t samples) {
+    AccumulationSettings quick = settings(wide, samples);
+    quick.short_picture = 32;
+    Accumulation accumulation(quick);
+    std::vector<std::uint32_t> targets;
+    while (!accumulation.done() && targets.size() < 20) {
+      EXPECT_EQ(accumulation.complete(), !targets.empty());
+      targets.push_back(accumulation.pass_target());
+      finish_tile(accumulation);
+      finish_tile(accumulation);  // the other tile
+    }
+    return targets;
+  };
+  EXPECT_EQ(passes(32), (std::vector<std::uint32_t>{1, 32}));
+  // A host may stop a longer picture, whose pixels then have similar numbers of samples.
+  EXPECT_EQ(passes(33), (std::vector<std::uint32_t>{1, 2, 4, 8, 16, 32, 33}));
+}
+
+TEST(Accumulation, MeasuresAfterTwoPassesIfThePictureIsShort) {
+  AccumulationSettings quick = settings(wide, 64);
+  quick.short_picture = 64;
+  quick.noise_target = 0.1;
+  Accumulation accumulation(quick);
+  EXPECT_EQ(accumulation.pass_target(), 1U);
+  finish_tile(accumulation);
+  finish_tile(accumulation);
+  EXPECT_EQ(accumulation.pass_target(), Accumulation::first_measured);
+}
+
 TEST(Accumulation, MoreSamplesContinueADoneOne) {
   Accumulation accumulation(settings(small, 4));
   finish_tile(accumulation, 4 * small_area);

@@ -226,7 +226,7 @@ TEST_F(Contract, Contract26eWarmUpOfAllEndsAndCoversEveryScene) {
     fake_.hollow_kernels({"#define CM_CHANNELS 1", "#define CM_ENVIRONMENT 1", "#define CM_EQUIANGULAR 1",
                           "#define CM_GROUPS 1", "#define CM_HOLDOUT 1", "#define CM_INSTANCES 1",
                           "#define CM_ANALYTIC_LIGHTS 1", "#define CM_MOTION 1", "#define CM_EXTENDED_BSDF 1",
-                          "#define CM_SECOND_LOBE 1"});
+                          "#define CM_SECOND_LOBE 1", "#define CM_GROUND 0"});
   }
   const cumulet::test::SurfacesRef panes = cumulet::test::make_panes(5.0F);
   const auto linked = [&] { return fake_.calls("LinkProgram"); };

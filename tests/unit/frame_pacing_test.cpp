@@ -73,6 +73,17 @@ TEST(DispatchCostTest, SingleSlowOutlierIsIgnored) {
   EXPECT_LT(*cost.most(128.0, true), 2.0);
 }
 
+TEST(DispatchCostTest, LearnsHowManyLanesTheDeviceRunsAtOnce) {
+  render::RoundCost cost;
+  cost.learn_groups(64, 64);  // all ran at once
+  cost.learn_groups(256, 2);  // a driver on two cores
+  EXPECT_FALSE(cost.resident_lanes());
+  cost.learn_groups(256, 100);
+  EXPECT_EQ(cost.resident_lanes(), 6400U);
+  cost.learn_groups(256, 80);  // beside another program
+  EXPECT_EQ(cost.resident_lanes(), 6400U);
+}
+
 TEST(DispatchPacerTest, DispatchesTakePartOfTheTimeThatIsLeft) {
   const render::DispatchPacer pacer(deadline_after(1000.0));
   EXPECT_FALSE(pacer.is_over());

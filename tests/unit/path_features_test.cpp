@@ -46,6 +46,10 @@ std::string undeclared(const PathFeatures& features) {
 bool is_possible(const PathFeatures& f) {
   const bool emitting = f.triangles == PathTriangles::emitting;
   if ((f.volume_holdout || f.motion) && !f.grid.several) return false;
+  if (!f.anisotropic && (f.ground_or_disk || f.grid.several || f.second_lobe)) return false;
+  if (!f.ground_or_disk && (f.layered != Layered::no || f.has_stages() || f.channels || f.analytic_lights ||
+                            f.separate_volume_aov || f.light_groups > 0))
+    return false;
   if (!f.has_stages() && (f.extended_bsdf || f.model_holdout)) return false;
   if (f.has_stages() && !emitting && (f.extended_bsdf || f.light_groups > 0)) return false;
   return !f.equiangular || (f.analytic_lights && !f.separate_volume_aov && !f.extended_bsdf && !f.volume_holdout &&
@@ -56,7 +60,7 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
   int pictures = 0;
   for (const bool several : {false, true}) {
     for (const PathTriangles triangles : {PathTriangles::none, PathTriangles::hit, PathTriangles::emitting}) {
-      for (unsigned bits = 0; bits < 1U << 12U; ++bits) {
+      for (unsigned bits = 0; bits < 1U << 14U; ++bits) {
         const auto bit = [&](unsigned i) { return (bits >> i & 1U) != 0; };
         PathFeatures features;
         features.grid = {March::dense, false, 1, false, several};
@@ -73,6 +77,8 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
         features.model_holdout = bit(9);
         features.motion = bit(10);
         features.separate_volume_aov = bit(11);
+        features.ground_or_disk = !bit(12);
+        features.anisotropic = !bit(13);
         if (!is_possible(features)) continue;
         ASSERT_EQ(undeclared(features), "");
         ++pictures;
@@ -105,6 +111,17 @@ TEST(PathFeatures, NeedOnlyDeclaredVariantsForEachGrid) {
       EXPECT_EQ(undeclared(features), "");
     }
   }
+}
+
+TEST(PathFeatures, PlainPathsHaveNoGroundAndNoDisk) {
+  PathFeatures features;
+  features.grid = {March::tet, true, 1, false, false};
+  const std::string general = text_of(trace_key(features));
+  EXPECT_EQ(general, "trace.comp, CM_MARCH 0, CM_LINEAR 1, CM_PAGES 1");
+  features.ground_or_disk = false;
+  EXPECT_EQ(text_of(trace_key(features)), general + ", CM_GROUND 0, CM_SUN_DISK 0");
+  features.anisotropic = false;
+  EXPECT_EQ(text_of(trace_key(features)), general + ", CM_GROUND 0, CM_SUN_DISK 0, CM_ISOTROPIC 1");
 }
 
 TEST(PathFeatures, MacrosOfAGridHaveOneOrder) {

@@ -52,4 +52,21 @@ TEST_P(PersistentThreads, ImageDoesNotDependOnDispatchLength) {
   }
 }
 
+// With previews there are other passes and dispatches, and the kernel has code for a ground and a sun disk.
+TEST_P(PersistentThreads, ImageDoesNotDependOnPreviews) {
+  std::vector<std::vector<float>> images;
+  for (const cumulet_preview preview : {CUMULET_PREVIEW_OFF, CUMULET_PREVIEW_AUTO}) {
+    viewer_ = make_viewer({.get_proc = cumulet::headless::Context::get_proc, .user = context_.get()});
+    v_ = viewer_.get();
+    auto sampling = make_desc<cumulet_sampling_desc>();
+    sampling.samples = 5;
+    sampling.preview = preview;
+    EXPECT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
+    EXPECT_EQ(cumulet_set_volume(v_, ball_.get()), CUMULET_OK);
+    make();
+    images.push_back(linear());
+  }
+  EXPECT_TRUE(images[0] == images[1]);
+}
+
 }  // namespace

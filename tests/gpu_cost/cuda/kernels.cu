@@ -7,6 +7,7 @@ namespace cumulet::core {
 
 #define CM_MARCH 0
 #define CM_PAGES 1
+#define CM_KEEPS_ENTRY 1
 #include "bindings.glsl"
 #include "parameters.glsl"
 __constant__ CmParameters cm;
@@ -42,6 +43,10 @@ __device__ CmPath* cm_lane_paths;
 __device__ CmPixel* cm_pixels;
 __device__ uint cm_next_slot;
 
+__device__ uint* cm_words;
+
+CM_FN uint cm_kept_cell(uint slot) { return cm_words[slot] - 1u; }
+CM_FN void cm_keep_cell(uint slot, uint cell) { cm_words[slot] = cell + 1u; }
 CM_FN uvec2 cm_pixel_of(uint slot) { return uvec2(slot % cm.view.size.x, slot / cm.view.size.x); }
 CM_FN CmPixel cm_load_pixel(uvec2 at) { return cm_pixels[at.y * cm.view.size.x + at.x]; }
 CM_FN void cm_store_pixel(CmPixel pixel, uvec2 at) { cm_pixels[at.y * cm.view.size.x + at.x] = pixel; }
