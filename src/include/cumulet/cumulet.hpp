@@ -623,7 +623,7 @@ class Surfaces {
 
 struct DisplayLutDesc {
   std::span<const float> values{};  ///< 3 per point, red fastest
-  std::uint32_t size = 0;         ///< points per axis
+  std::uint32_t size = 0;           ///< points per axis
   LutShaper shaper{};
   float domain_min = 0.0F;
   float domain_max = 0.0F;

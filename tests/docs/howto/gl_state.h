@@ -1,5 +1,5 @@
 // Names of the reader's host in docs/howto/gl_state.md.
-#include "host.h"
 #include <math.h>
+#include "host.h"
 
 void apply_view(float* rgb);
