@@ -19,9 +19,9 @@ void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells);
 
 /// Builds a grid on this thread. Throws Error(cancelled), and everything that its steps throw.
 ///
-/// A GPU build is only planned here; the GPU executes the plan. Volumes that move while the shutter is open are built on
-/// the CPU, and this is logged. Grids are coarsened to fit the main and GPU memory limits; if even the coarsest does not
-/// fit, Error(out_of_memory) is thrown.
+/// A GPU build is only planned here; the GPU executes the plan. Volumes that move while the shutter is open are built
+/// on the CPU, and this is logged. Grids are coarsened to fit the main and GPU memory limits; if even the coarsest does
+/// not fit, Error(out_of_memory) is thrown.
 ///
 /// before: for a moving camera, the plan that is shown now. Its cells are kept where possible to avoid popping. The
 /// result has no source if GPU-resident voxels are needed in main memory first.
