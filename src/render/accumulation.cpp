@@ -36,6 +36,7 @@ Accumulation::Accumulation(const AccumulationSettings& settings)
   tiles_.count = (box().size + tiles_.size - 1U) / tiles_.size;
   const glm::uvec2 squares = tile_squares();
   lanes_ = std::min(CM_SQUARE_PIXELS * squares.x * squares.y, settings.max_lanes);
+  max_lanes_ = lanes_;
   pass_target_ = pass_after(0);
   allotment_.begin(box().size);
   expectation_.expected_samples = allotment_.expected(target_samples());
@@ -138,7 +139,13 @@ void Accumulation::go_on_from(const Accumulated& counts, std::optional<std::uint
   begin_tile();
 }
 
+void Accumulation::limit_lanes(std::uint32_t lanes) {
+  if (has_lanes_for_all()) return;
+  max_lanes_ = std::min(lanes_, std::max(min_lanes, lanes / block_lanes * block_lanes));
+}
+
 void Accumulation::begin_tile() {
+  lanes_ = max_lanes_;
   // In-flight dispatches update the blocks that they were sent for, which are not read any more.
   blocks_ = std::make_shared<Blocks>();
   squares_.clear();

@@ -99,6 +99,8 @@ class Accumulation {
   [[nodiscard]] std::uint32_t slots() const;
   /// Number of lanes.
   [[nodiscard]] std::uint32_t lanes() const { return lanes_; }
+  /// Limits the number of lanes of later tiles and passes, if there are fewer lanes than pixels.
+  void limit_lanes(std::uint32_t lanes);
   /// Blocks of lanes of the current tile and pass. Dispatches update them, also after the tile has ended.
   [[nodiscard]] const std::shared_ptr<Blocks>& blocks() const { return blocks_; }
   /// Finished samples. Dispatches update the count, also after the picture was restarted.
@@ -152,6 +154,7 @@ class Accumulation {
   AccumulationSettings settings_;
   Tiles tiles_;
   std::uint32_t lanes_ = 0;
+  std::uint32_t max_lanes_ = 0;  // of the next tile
   std::shared_ptr<Blocks> blocks_;
   std::size_t next_block_ = 0;
   std::uint32_t pass_target_ = 1;

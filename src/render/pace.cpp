@@ -42,7 +42,6 @@ std::optional<double> choose_blocks(const Blocks& blocks, std::size_t from, std:
     const double slots = what.slots + std::ceil(block.unfinished / lanes_per_slot);
     const auto ms = what.cost->most(slots, free);
     if (!what.blocks.empty() && (!ms || *ms * worthwhile_rounds > what.aim_ms)) break;
-    if (!what.blocks.empty() && lanes > what.cost->resident_lanes().value_or(lanes)) break;
     what.blocks.push_back(static_cast<std::uint32_t>(index));
     what.lanes = lanes;
     what.slots = slots;
@@ -131,9 +130,9 @@ void RoundCost::learn(double slots, double low_ms, double high_ms) {
   }
 }
 
-std::optional<double> RoundCost::resident_lanes() const {
+std::optional<std::uint32_t> RoundCost::resident_lanes() const {
   if (resident_groups_ == 0) return std::nullopt;
-  return double{CM_SQUARE_PIXELS} * resident_groups_;
+  return CM_SQUARE_PIXELS * resident_groups_;
 }
 
 void RoundCost::learn_groups(std::uint32_t sent, std::uint32_t most) {

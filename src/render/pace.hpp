@@ -29,7 +29,7 @@ class RoundCost {
 
   /// Returns the number of lanes that the device runs at once; nullopt if no dispatch had more. Further lanes wait
   /// until others end, in a second wave that fills the device only partly.
-  [[nodiscard]] std::optional<double> resident_lanes() const;
+  [[nodiscard]] std::optional<std::uint32_t> resident_lanes() const;
   /// Records that of `sent` work groups with paths at most `most` ran at once.
   void learn_groups(std::uint32_t sent, std::uint32_t most);
 

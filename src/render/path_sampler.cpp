@@ -107,6 +107,7 @@ bool PathSampler::accumulate(Picture& picture, const MarchData& data, const Trac
       break;
     }
     dispatches_.collect();
+    if (const auto lanes = kernels.program.cost->resident_lanes()) accumulation.limit_lanes(*lanes);
     accumulation.end_tile();
   }
   return accumulation.done();

@@ -74,6 +74,24 @@ TEST(Accumulation, EachPassEndsInEveryTile) {
   EXPECT_EQ(corners, (std::vector<std::uint32_t>{0, 1024, 0, 1024, 0, 1024}));
 }
 
+TEST(Accumulation, LaterPassesHaveAsManyLanesAsTheDeviceRuns) {
+  AccumulationSettings many = settings(wide, 4);
+  many.max_lanes = 48 * CM_BLOCK_LANES;
+  Accumulation accumulation(many);
+  ASSERT_EQ(accumulation.lanes(), 48 * CM_BLOCK_LANES);
+  accumulation.limit_lanes(40 * CM_BLOCK_LANES + 64);
+  EXPECT_EQ(accumulation.lanes(), 48 * CM_BLOCK_LANES) << "the lanes of the tile have paths";
+  finish_tile(accumulation);
+  EXPECT_EQ(accumulation.lanes(), 40 * CM_BLOCK_LANES);
+  accumulation.limit_lanes(1000);
+  finish_tile(accumulation);
+  EXPECT_EQ(accumulation.lanes(), Accumulation::min_lanes);
+  Accumulation has_a_lane_for_each_pixel(settings(small, 4));
+  has_a_lane_for_each_pixel.limit_lanes(64);
+  has_a_lane_for_each_pixel.begin_tile();
+  EXPECT_EQ(has_a_lane_for_each_pixel.lanes(), 384U);
+}
+
 TEST(Accumulation, HasASlotForEachPixelOfATile) {
   EXPECT_EQ(Accumulation(settings(small, 1)).slots(), 24U * 16U) << "whole blocks of 8x8 pixels";
   EXPECT_EQ(Accumulation(settings(wide, 1)).slots(), 1024U * 64U);
