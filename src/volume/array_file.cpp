@@ -345,7 +345,7 @@ class ArrayReader final : public Reader {
     info.name = info.unique_name = field.name;
     if (std::ranges::count(fields_, field.name, &ArrayField::name) > 1) {
       const auto before = std::ranges::count(grids_, field.name, &GridInfo::name);
-      info.unique_name += "[" + std::to_string(before) + "]";
+      info.unique_name += '[' + std::to_string(before) + "]";
     }
     info.type = scalar ? name_of(field.type) : "vec3s";
     info.grid_class = "fog volume";

@@ -44,13 +44,13 @@ Number number_of(std::string_view text, std::string_view key) {
 glm::dvec3 vector_of(std::string_view text, std::string_view key) {
   const std::string_view whole = text;
   if (!text.starts_with('(') || !text.ends_with(')'))
-    fail("\"" + std::string(key) + "\" has '" + one_line(whole, 60) + "' in place of (x,y,z)");
+    fail('"' + std::string(key) + "\" has '" + one_line(whole, 60) + "' in place of (x,y,z)");
   text = text.substr(1, text.size() - 2);
   glm::dvec3 vector(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t end = text.find(',');
     if ((end == std::string_view::npos) != (axis == 2))
-      fail("\"" + std::string(key) + "\" has '" + one_line(whole, 60) + "' in place of (x,y,z)");
+      fail('"' + std::string(key) + "\" has '" + one_line(whole, 60) + "' in place of (x,y,z)");
     vector[axis] = number_of<double>(trimmed(text.substr(0, end)), key);
     text.remove_prefix(axis < 2 ? end + 1 : text.size());
   }
@@ -225,7 +225,7 @@ std::uint64_t skip_lines(ByteSource& content, std::uint64_t position, std::uint6
 }
 
 std::unique_ptr<ByteSource> open_detached(const std::string& name, const std::optional<std::filesystem::path>& folder) {
-  const std::string quoted = "\"" + one_line(name) + "\"";
+  const std::string quoted = '"' + one_line(name) + "\"";
   if (name.starts_with("LIST") || name.find('%') != std::string::npos)
     fail("has its values in several files (" + quoted + "), which is not supported");
   if (!folder) fail("has its values in the file " + quoted + ", but the data has no folder");

@@ -439,13 +439,14 @@ TEST_P(GpuGridBuilds, InterpolatedVolumesMatchTheCpu) {
     const auto velocity = records<glm::uvec2>(built, grid::Channel::velocity);
     for (std::size_t c = 0; c < built.count; ++c) {
       for (int k = 0; k < 3; ++k)
-        ASSERT_NEAR(emission[c].mean[k], expected.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F) << c;
+        ASSERT_NEAR(emission[c].mean[k], expected.channels.emission[c].mean[k], 1e-5F * emission[c].mean[k] + 2e-4F)
+            << c;
       if (core::cm_record_fit(read.cells[c].data).x < 0.05F) continue;
-      const glm::vec3 colors = core::cm_cell_color(color[c]) - core::cm_cell_color(expected.color[c]);
+      const glm::vec3 colors = core::cm_cell_color(color[c]) - core::cm_cell_color(expected.channels.color[c]);
       ASSERT_LT(glm::length(colors), 2.0F / 1023.0F) << c;
-      ASSERT_NEAR(anisotropy[c], expected.anisotropy[c], 8) << c;
+      ASSERT_NEAR(anisotropy[c], expected.channels.anisotropy[c], 8) << c;
       const glm::vec3 speed = core::cm_cell_velocity(velocity[c]);
-      const glm::vec3 wanted = core::cm_cell_velocity(expected.velocity[c]);
+      const glm::vec3 wanted = core::cm_cell_velocity(expected.channels.velocity[c]);
       for (int k = 0; k < 3; ++k) ASSERT_NEAR(speed[k], wanted[k], ulp_of(wanted[k]) + 4e-6F * Carrying::fastest) << c;
       ++compared;
     }
