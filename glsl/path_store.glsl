@@ -17,8 +17,8 @@ layout(std430, binding = CM_STORAGE_BLOCKS) buffer CmBlocks {
   uint cm_next_slot;               // first unused pixel slot
   uint cm_squares[CM_MAX_SQUARES];  // list of the sampled 8x8 blocks of pixels: CM_SQUARE_ROWS
   uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];  // per list and block: number of lanes with a path
-  uint cm_words[];  // per pixel slot: entry cell of its last camera ray, plus one; 0: unknown. Then per list: lanes of all
-                    // blocks; in each block the active lanes come first
+  uint cm_slot_words[];  // per pixel slot: entry cell of its last camera ray, plus one; 0: unknown. Then per list: lanes
+                         // of all blocks; in each block the active lanes come first
 };
 
 #define CM_ZERO_VEC3(name) p.name = vec3(0.0);
@@ -170,12 +170,12 @@ uint cm_ranked_lane() {
   if (cm_index_in_block() == 0u) cm_active_counts[cm_list(2u) * CM_MAX_BLOCKS + cm_block()] = 0u;
   if (cm_block_begins()) return cm_block_lane();
   if (cm_index_in_block() >= cm_active_counts[cm_list(0u) * CM_MAX_BLOCKS + cm_block()]) return cm_lanes();
-  return cm_words[cm_list_at(cm_list(0u)) + cm_index_in_block()];
+  return cm_slot_words[cm_list_at(cm_list(0u)) + cm_index_in_block()];
 }
 // Adds the lane to the list of the next dispatch.
 void cm_join_ranks(uint lane) {
   uint rank = atomicAdd(cm_active_counts[cm_list(1u) * CM_MAX_BLOCKS + cm_block()], 1u);
-  cm_words[cm_list_at(cm_list(1u)) + rank] = lane;
+  cm_slot_words[cm_list_at(cm_list(1u)) + rank] = lane;
 }
 
 #endif

@@ -16,8 +16,8 @@ uvec2 cm_pixel_of(uint slot) {
 }
 
 // Entry cell of the pixel's camera rays, for glsl/free_flight.glsl.
-uint cm_kept_cell(uint slot) { return cm_words[slot] - 1u; }
-void cm_keep_cell(uint slot, uint cell) { cm_words[slot] = cell + 1u; }
+uint cm_kept_cell(uint slot) { return cm_slot_words[slot] - 1u; }
+void cm_keep_cell(uint slot, uint cell) { cm_slot_words[slot] = cell + 1u; }
 
 // Returns true if the slot's pixel needs samples. samples: the number it has.
 bool cm_is_due(uint slot, out uint samples) {

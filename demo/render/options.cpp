@@ -657,7 +657,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   app.footer(
       "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.\n"
       "Ctrl-C writes the samples so far and exits with 1; a second Ctrl-C stops at once.\n"
-      "Without --stats, --trace and --checkpoint, a .png is written after 10 s and gets better until the end.\n"
+      "Without --stats, --trace and --checkpoint, a .png is first written after 10 s, and then improves.\n"
       "For a sequence, one line per frame is printed: frame 12 (3 of 20) done|kept|failed FILE...\n"
       "Frames that cannot be read fail, and the others are rendered; the exit status is then 1.\n"
       "Ctrl-C does not write the current frame of a sequence.");

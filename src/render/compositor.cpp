@@ -242,11 +242,13 @@ Compositor::Means* Compositor::resolve(const PictureTextures& picture, Backgroun
 }
 
 const gl::Program* Compositor::color_program(const Kind& kind, const Display& display, Wait wait) {
+  // In the order of the shader's list of variants, from which warm_up() makes the same keys.
   std::vector<std::string> defines{gl::macros::depth(0), gl::macros::bilinear(kind.bilinear),
-                                   gl::macros::resolved(kind.resolved),
-                                   gl::macros::encode(kind.encoding == ColorEncoding::srgb ? "true" : "false")};
-  defines.push_back(kind.lut ? gl::macros::lut(1) : gl::macros::tone_map(std::to_string(curve_of(display)) + "u"));
+                                   gl::macros::resolved(kind.resolved)};
+  if (!kind.lut) defines.push_back(gl::macros::tone_map(std::to_string(curve_of(display)) + "u"));
+  defines.push_back(gl::macros::encode(kind.encoding == ColorEncoding::srgb ? "true" : "false"));
   if (kind.layered) defines.push_back(gl::macros::layers(1));
+  if (kind.lut) defines.push_back(gl::macros::lut(1));
   const bool serves = color_ != nullptr && color_kind_ == kind;  // color_ can be used meanwhile
   const gl::Program& wanted = program(key_of(std::move(defines)), wait, serves);
   if (wanted.usable()) {

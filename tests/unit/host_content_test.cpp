@@ -1,5 +1,7 @@
 // Volumes of the C API from bytes in memory and from streams of the host.
 
+#define NANOVDB_USE_ZIP
+
 #include <cumulet/cumulet.h>
 #include <gtest/gtest.h>
 #include <nanovdb/util/IO.h>
