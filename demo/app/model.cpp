@@ -342,7 +342,7 @@ std::string main_file(const SceneOptions& scene) {
 
 std::string scene_name(const Model& model) {
   const std::string& file = model.scene_path.empty() ? main_file(model.scene) : model.scene_path;
-  const std::string name = fs::path(file).filename().string();
+  std::string name = fs::path(file).filename().string();
   if (!model.modified) return name;
   return "*" + (name.empty() ? "Untitled" : name);
 }

@@ -28,7 +28,7 @@ void write_name(int file, const std::string& path, const std::string& name) {
 
 }  // namespace
 
-RecoveryFile::RecoveryFile(const std::string& folder) : folder_(folder) {
+RecoveryFile::RecoveryFile(std::string folder) : folder_(std::move(folder)) {
   if (folder_.empty()) return;
   std::error_code error;
   fs::create_directories(folder_, error);

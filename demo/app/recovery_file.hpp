@@ -12,7 +12,7 @@ class RecoveryFile {
  public:
   /// Takes a file that an ended process has left, or else an unused one. folder: created if it is missing; "": no
   /// recovery file.
-  explicit RecoveryFile(const std::string& folder);
+  explicit RecoveryFile(std::string folder);
   RecoveryFile(const RecoveryFile&) = delete;
   RecoveryFile& operator=(const RecoveryFile&) = delete;
   ~RecoveryFile();

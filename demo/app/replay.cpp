@@ -110,10 +110,7 @@ class Parser {
     using Type = ReplayStep::Type;
     const std::string command = line.word();
     if (command == "wait") {
-      const std::string what = line.word();
-      if (what != "loaded" && what != "converged" && what != "rendered")
-        line.fail("wait needs loaded, converged or rendered");
-      add(what == "loaded" ? Type::wait_loaded : what == "converged" ? Type::wait_converged : Type::wait_rendered);
+      wait(line);
     } else if (command == "frames") {
       add(Type::frames).count = line.integer(1, max_frames);
     } else if (command == "idle") {
@@ -190,6 +187,13 @@ class Parser {
     step.line = line_;
     step.type = type;
     return step;
+  }
+  void wait(Line& line) {
+    using Type = ReplayStep::Type;
+    const std::string what = line.word();
+    if (what != "loaded" && what != "converged" && what != "rendered")
+      line.fail("wait needs loaded, converged or rendered");
+    add(what == "loaded" ? Type::wait_loaded : what == "converged" ? Type::wait_converged : Type::wait_rendered);
   }
   void event(Event what) { add(ReplayStep::Type::event).event = std::move(what); }
   void move(const Position& position) {

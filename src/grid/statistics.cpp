@@ -76,7 +76,7 @@ BrickTree::Leaf leaf_of(const vec3& v0, std::uint32_t shape) {
     const int axis = step.x != 0 ? 0 : (step.y != 0 ? 1 : 2);
     const auto at = static_cast<std::size_t>(i);
     leaf.step[at] = static_cast<std::int16_t>(corner_index(step));
-    leaf.axis[at] = static_cast<std::int8_t>(step[axis] > 0 ? axis : ~axis);
+    leaf.axis[at] = static_cast<std::int16_t>(step[axis] > 0 ? axis : ~axis);
   }
   return leaf;
 }

@@ -55,7 +55,7 @@ struct BrickTree {
   struct Leaf {
     std::uint16_t first;               ///< index of its vertex 0
     std::array<std::int16_t, 3> step;  ///< of the index, along each axis of its frame
-    std::array<std::int8_t, 3> axis;   ///< axis of the cube; negative direction: ~axis
+    std::array<std::int16_t, 3> axis;  ///< axis of the cube; negative direction: ~axis
   };
   std::array<Leaf, 512> leaf;
 };

@@ -36,8 +36,8 @@ inline glm::vec3 encoded_color(const DisplayLut& lut, const glm::vec3& exposed) 
   glm::vec3 color(0.0F);
   for (int i = 0; i < 4; ++i) {
     const glm::ivec3& point = cell.points[i];
-    color +=
-        cell.weights[i] * lut.points[static_cast<std::size_t>((point.z * lut.size + point.y) * lut.size + point.x)];
+    const int at = (point.z * lut.size + point.y) * lut.size + point.x;
+    color += cell.weights[i] * lut.points[static_cast<std::size_t>(at)];
   }
   return glm::clamp(color, 0.0F, 1.0F);
 }

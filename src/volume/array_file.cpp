@@ -247,8 +247,8 @@ Convert converter_of(NumberType type) {
   return number_at<double>;
 }
 
-[[noreturn]] void fail_truncated(std::uint64_t numbers, std::uint64_t found) {
-  fail("the file is truncated: it has " + std::to_string(found) + " of " + std::to_string(numbers) + " values");
+[[noreturn]] void fail_truncated(std::uint64_t wanted, std::uint64_t available) {
+  fail("the file is truncated: it has " + std::to_string(available) + " of " + std::to_string(wanted) + " values");
 }
 
 void read_binary(Pieces& pieces, const ArrayField& field, std::vector<float>& numbers, ProgressPart& part) {
@@ -323,7 +323,8 @@ class ArrayReader final : public Reader {
       }
       numbers.resize(numbers.size() / 3);
     }
-    kept_.assign(1, std::move(numbers));
+    kept_.clear();
+    kept_.push_back(std::move(numbers));
     return source(field, 0, portion.part(0.7, 1.0));
   }
 
@@ -371,8 +372,9 @@ class ArrayReader final : public Reader {
 }  // namespace
 
 std::optional<NumberType> number_type_of(std::string_view name) {
-  const auto found = std::ranges::find(type_names, name, &TypeName::name);
-  return found == type_names.end() ? std::nullopt : std::optional(found->type);
+  for (const TypeName& type : type_names)
+    if (type.name == name) return type.type;
+  return std::nullopt;
 }
 
 const char* name_of(NumberType type) { return std::ranges::find(type_names, type, &TypeName::type)->name.data(); }

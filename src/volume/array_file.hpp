@@ -68,7 +68,7 @@ std::optional<std::filesystem::path> raw_description_of(const std::filesystem::p
 /// Opens a file of numbers without a header.
 std::unique_ptr<Reader> open_raw(std::unique_ptr<ByteSource> content, const std::filesystem::path& description,
                                  Progress* progress);
-/// Returns the array that a JSON text describes. Throws std::runtime_error.
-ArrayField raw_field_of(std::string_view json);
+/// Returns the array that this JSON text describes. Throws std::runtime_error.
+ArrayField raw_field_of(std::string_view text);
 
 }  // namespace cumulet::volume::detail

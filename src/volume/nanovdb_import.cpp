@@ -57,7 +57,7 @@ class NanoLeaves final : public HeldLeaves {
     const auto& bits = leaves_[leaf]->data()->mValueMask;  // its words have no accessor in all versions
     ActiveMask mask;
     static_assert(sizeof mask == sizeof bits);
-    std::memcpy(mask.data(), &bits, sizeof mask);
+    std::memcpy(mask.data(), reinterpret_cast<const std::byte*>(&bits), sizeof mask);
     return mask;
   }
   void values(std::size_t leaf, float* out) const override {

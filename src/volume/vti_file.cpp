@@ -147,7 +147,7 @@ class VtiHeader {
     }
     for (int column = 0; column < 3; ++column) {
       for (int row = 0; row < 3; ++row) {
-        const auto entry = static_cast<std::size_t>(3 * row + column);
+        const auto entry = 3U * static_cast<std::size_t>(row) + static_cast<std::size_t>(column);
         field.index_to_world[column][row] = direction_.at(entry) * spacing_.at(static_cast<std::size_t>(column));
       }
     }

@@ -75,7 +75,7 @@ def test_change(s):
     s.play("replay", [*SETTLE, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5',
                       "move viewport 0.5 0.5", *SETTLE, *shot("thin"), "key ctrl+z", *SETTLE, *shot("thick"), "key n", *SETTLE, *shot("wide"), "key n",
                       *shown("Sun & sky"), 'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *SETTLE, *shot("sun"), *shown("Render"), 'click "Tone map"',
-                      "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), *tab("Advanced"), 'click "Threshold"',
+                      "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), *tab("Advanced"),
                       'drag "Threshold" to "Threshold" 0.95 0.5', *SETTLE, *shot("coarse"), "key 2", *SETTLE, *shot("cells"),
                       "key 3", *SETTLE, *shot("steps"), "key 5", *SETTLE, *shot("wireframe"), "key 1"],
            "--volume", s.cumulus)

@@ -20,6 +20,7 @@ Model refining() {
   model.status.frame.flags = CUMULET_RENDER_INCOMPLETE;
   model.status.stats.samples = 42 * 5000;
   model.status.noise = 0.0123;
+  model.scene.display.denoise = CUMULET_DENOISE_OFF;
   return model;
 }
 
