@@ -344,7 +344,7 @@ std::string scene_name(const Model& model) {
   const std::string& file = model.scene_path.empty() ? main_file(model.scene) : model.scene_path;
   std::string name = fs::path(file).filename().string();
   if (!model.modified) return name;
-  return "*" + (name.empty() ? "Untitled" : name);
+  return '*' + (name.empty() ? "Untitled" : name);
 }
 
 std::string suggest_path(const Model& model, const std::string& ending) {

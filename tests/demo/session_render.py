@@ -88,7 +88,7 @@ def test_render_sequence(s):
     there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
     s.play("replay", [*there, "key f12", "frames 3", *SMALL, 'click "Sequence"', "frames 2", *shot("dialog"), *enter("Picture file", "out_##.png"),
                       "key .", *there, "wait rendered", "frames 3", *shot("done"),
-                      "key f12", "frames 3", 'click "Sequence"', "frames 2", *enter("Picture file", "still.png"), "wait rendered", "frames 3",
+                      "key f12", "frames 3", 'click "Sequence"', "frames 2", *enter("Picture file", "single.png"), "wait rendered", "frames 3",
                       *shot("still")],
            "fire_#.vdb", "--spp", "1", "--max-bounces", "2", "--shader-cache", "shaders", size=["--size", "900x600"])
     (entry,) = s.report("done")["renders"]
@@ -98,7 +98,7 @@ def test_render_sequence(s):
     assert [one.width, one.height] == [96, 54] and one.rows != two.rows, "each frame has its own picture"
     assert_alike(one, s.picture("out_03"), (0, 0, 96, 54))
     assert s.report("still")["renders"][-1]["state"] == DONE
-    assert_alike(two, s.picture("still"), (0, 0, 96, 54))
+    assert_alike(two, s.picture("single"), (0, 0, 96, 54))
 
 
 def write_model(file):
