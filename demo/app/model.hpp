@@ -239,7 +239,7 @@ struct Model {
   Tool tool = Tool::move;          // none: no handles, outlines or light icons in the image
   Axes axes = Axes::world;         // axes of the handles
   std::optional<Item> chosen;      // selected object
-  std::optional<Subject> subject;  // what the inspector shows; nullopt: the first object
+  std::optional<Subject> subject;  // shown in the inspector; nullopt: the first object
   bool playing = false;
   double clock = 0.0;               // seconds; the surfaces' animation uses it too if a sequence is shown
   std::optional<std::string> undo;  // name of the step that can be undone
@@ -261,7 +261,7 @@ struct Model {
   Model();
 };
 
-/// Returns what the inspector shows. Objects that are removed are replaced by the first one.
+/// Returns the subject of the inspector. Objects that are removed are replaced by the first one.
 [[nodiscard]] Subject subject_of(const Model& model);
 /// Shows a part or object in the inspector. Objects with a position are also selected in the image.
 void select(Model& model, const Subject& subject);

@@ -9,8 +9,8 @@
 
 namespace cumulet::demo {
 
-/// The list of all parts and objects of the scene. A click selects what the inspector shows. Objects have an eye, which
-/// hides them, and a context menu; a double click renames them.
+/// The list of all parts and objects of the scene. A click selects the subject of the inspector. Objects have an eye,
+/// which hides them, and a context menu; a double click renames them.
 class Outliner {
  public:
   /// ui must outlive it.

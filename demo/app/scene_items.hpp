@@ -25,7 +25,7 @@ struct Item {
 
 /// A part of the scene that exists once.
 enum class Part { render, camera, sun_sky, environment, ground, surfaces };
-/// What the inspector shows.
+/// A part or an object of the scene, as the inspector shows it.
 using Subject = std::variant<Part, Item>;
 
 /// Returns a volume of the scene; index 0 is the first volume.
