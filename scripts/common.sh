@@ -8,6 +8,8 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 # The folders of build/ share the ccache: tests/run.sh does not recompile the files that demo/run.sh compiled.
 export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
+# ccache needs this to store the tests, which use precompiled headers.
+export CCACHE_SLOPPINESS=pch_defines,time_macros
 script_started=$SECONDS
 jobs=${CUMULET_JOBS:-$(nproc)}
 # Compiling OpenVDB's headers takes up to 1.5 GiB per compiler process.
