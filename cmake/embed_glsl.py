@@ -7,7 +7,10 @@ A shader that is compiled with macros lists them in comments; gl::Programs build
     // variants: - or CM_LAYERS=1
 
 A line holds alternatives, and every variant has exactly one of them; "-" means none of the macros. 1,2 are values; 1..8
-is a range of values. The variants are the product of the lines; cmake/validate_glsl.py validates them.
+is a range of values. The variants are the product of the lines; cmake/validate_glsl.py validates them. A combination of
+macros that no picture needs is left out of the product:
+
+    // excluded: CM_LAYERS=1 CM_AOVS=1 or CM_LAYERS=1 CM_GROUPS=1
 
 Shaders share alternatives by a list with a name. "..." marks the position of the macros that a use adds:
 
@@ -75,7 +78,21 @@ def variants_of(name, source):
     lines = []
     for line in re.findall(r"^// variants:(.*)$", source, re.M):
         lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in with_lists(line, lists)])
-    return [sum(choice, []) for choice in itertools.product(*lines)]
+    excluded = [{parse_macro(m, name)[0]: parse_macro(m, name)[1] for m in part.split()}
+                for line in re.findall(r"^// excluded:(.*)$", source, re.M) for part in line.split(" or ")]
+    variants = [sum(choice, []) for choice in itertools.product(*lines)]
+    for macros in excluded:
+        kept = [variant for variant in variants if not has_all(variant, macros)]
+        if len(kept) == len(variants):
+            sys.exit(f"{name}: no variant has the excluded macros {' '.join(macros)}")
+        variants = kept
+    return variants
+
+
+def has_all(variant, macros):
+    """Returns whether a variant has each of these macros (name -> values) with just these values."""
+    mine = {macro: values for macro, values, _ in variant}
+    return all(mine.get(macro) == values for macro, values in macros.items())
 
 
 def variant_tables(symbol, variants):

@@ -6,6 +6,7 @@
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1
 // variants: - or CM_ENVIRONMENT=1
+// excluded: CM_GROUND=0 CM_INSTANCES=1 or CM_GROUND=0 CM_CHANNELS=1 or CM_ISOTROPIC=1 CM_SECOND_LOBE=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "bindings.glsl"

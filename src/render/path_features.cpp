@@ -103,12 +103,11 @@ PathFeatures path_features(const MarchData& data, const PictureParameters& param
                          !features.extended_bsdf && !features.volume_holdout && !features.model_holdout &&
                          (features.has_stages() || features.layered == Layered::no);
   // To limit the number of variants, only the most frequent kernels have others for these.
-  const bool plain = shaded && !options.preview && !features.has_stages() && !features.channels &&
-                     !features.analytic_lights && !features.separate_volume_aov && features.light_groups == 0 &&
-                     features.layered == Layered::no;
+  const bool plain = shaded && !options.preview && !features.grid.several && !features.has_stages() &&
+                     !features.channels && !features.analytic_lights && !features.separate_volume_aov &&
+                     features.light_groups == 0 && features.layered == Layered::no;
   features.ground_or_disk = !plain || parameters.ground.reach > 0.0F || parameters.lights.sun_spread > 0.0F;
-  features.anisotropic =
-      features.ground_or_disk || features.grid.several || features.second_lobe || medium.anisotropy != 0.0F;
+  features.anisotropic = features.ground_or_disk || features.second_lobe || medium.anisotropy != 0.0F;
   return features;
 }
 
