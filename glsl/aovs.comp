@@ -101,8 +101,9 @@ vec2 cm_backward_surface(CmHit hit, vec3 p) {
 }
 #endif
 
-// Mean motion vector of the media in the ray's segment up to t_1, weighted by extinction. p: middle of the scattering.
-vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
+// Motion vector of the media at t, weighted by extinction in the ray's segment up to t_1.
+vec2 cm_walk_backward(inout CmWalk walk, float t_1, float t) {
+  vec3 p = walk.o + t * walk.d;
   vec2 motion = vec2(0.0);
   float sum = 0.0;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
@@ -111,7 +112,7 @@ vec2 cm_walk_backward(inout CmWalk walk, float t_1, vec3 p) {
     float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
     vec3 then = p;
     if (CM_GRID.moves != 0u)
-      then -= cm_motion_frame.seconds * cm_to_cube(cm_out_of_volume(cm_march_velocity(front.cell.xy, cm_front_middle(walk.o, walk.d, front))));
+      then -= cm_motion_frame.seconds * cm_to_cube(cm_out_of_volume(cm_march_velocity(front.cell.xy, cm_volume_point_at(walk.o, walk.d, t))));
     motion += extinction * cm_backward_point(p, then, CM_MOTION_VOLUMES + front.volume);
     sum += extinction;
   }
@@ -282,14 +283,14 @@ void main() {
       scatters += clear * probability * vec2(1.0, z);
       if (t < solid_t) {
         emission += clear * probability * cm_walk_source(walk);
-        medium += clear * probability * cm_walk_scatters(walk);
+        medium += clear * probability * cm_walk_scatters(walk, middle);
         if (before.x == 0.0) first_z = z;
         float beyond = z - first_z;
         before += clear * probability * vec3(1.0, beyond, beyond * beyond);
       }
 #if CM_VELOCITY
-      velocity += clear * probability * cm_walk_velocity(walk, t_1);
-      volume_motion += clear * probability * cm_walk_backward(walk, t_1, o + middle * d);
+      velocity += clear * probability * cm_walk_velocity(walk, t_1, middle);
+      volume_motion += clear * probability * cm_walk_backward(walk, t_1, middle);
 #endif
       clear -= clear * probability;
       cm_walk_on(walk, t_1);

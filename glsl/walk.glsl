@@ -189,13 +189,11 @@ vec3 cm_walk_source(inout CmWalk walk) {
 #endif
 }
 
-// The middle of a front's segment, in the cube space of its volume, where the ray stands.
-vec3 cm_front_middle(vec3 o, vec3 d, CmFront front) {
-  return cm_in_volume_point(o) + 0.5 * (front.t_0 + front.t_1) * cm_in_volume(d);
-}
+// The point of a ray at t, in the cube space of the volume where it stands.
+vec3 cm_volume_point_at(vec3 o, vec3 d, float t) { return cm_in_volume_point(o) + t * cm_in_volume(d); }
 
-// Albedo and mean scattering cosine of the active media, weighted by extinction.
-vec4 cm_walk_scatters(inout CmWalk walk) {
+// Albedo and mean scattering cosine of the active media at t, weighted by extinction.
+vec4 cm_walk_scatters(inout CmWalk walk, float t) {
   vec4 scatters = vec4(0.0);
   float sum = 0.0;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
@@ -204,8 +202,8 @@ vec4 cm_walk_scatters(inout CmWalk walk) {
     vec3 albedo = CM_MEDIUM.holdout != 0u ? vec3(0.0) : CM_MEDIUM.albedo;
     vec4 here = vec4(albedo, mix(CM_MEDIUM.anisotropy, CM_MEDIUM.second_anisotropy, CM_MEDIUM.second_weight));
 #if CM_CHANNELS
-    if (CM_MEDIUM.colored != 0u) here.rgb *= cm_march_color(walk.front[k].cell.xy, cm_front_middle(walk.o, walk.d, walk.front[k]));
-    if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy, cm_front_middle(walk.o, walk.d, walk.front[k]));
+    if (CM_MEDIUM.colored != 0u) here.rgb *= cm_march_color(walk.front[k].cell.xy, cm_volume_point_at(walk.o, walk.d, t));
+    if (CM_MEDIUM.anisotropic != 0u) here.a = cm_march_anisotropy(walk.front[k].cell.xy, cm_volume_point_at(walk.o, walk.d, t));
 #endif
     scatters += extinction * here;
     sum += extinction;
@@ -214,8 +212,8 @@ vec4 cm_walk_scatters(inout CmWalk walk) {
 }
 
 #if CM_VELOCITY
-// Mean velocity of the medium in the segment up to t_1, weighted by extinction; world units per second.
-vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
+// Velocity of the media at t, weighted by extinction in the segment up to t_1; world units per second.
+vec3 cm_walk_velocity(inout CmWalk walk, float t_1, float t) {
   vec3 velocity = vec3(0.0);
   float sum = 0.0;
   for (int k = 0; CM_IS_FRONT(k, walk); ++k) {
@@ -223,7 +221,7 @@ vec3 cm_walk_velocity(inout CmWalk walk, float t_1) {
     cm_stand_at(front);
     float extinction = cm_front_extinction(front, walk.t) + cm_front_extinction(front, t_1);
     if (extinction > 0.0 && CM_GRID.moves != 0u)
-      velocity += extinction * cm_out_of_volume(cm_march_velocity(front.cell.xy, cm_front_middle(walk.o, walk.d, front)));
+      velocity += extinction * cm_out_of_volume(cm_march_velocity(front.cell.xy, cm_volume_point_at(walk.o, walk.d, t)));
     sum += extinction;
   }
   return sum > 0.0 ? velocity / sum : vec3(0.0);

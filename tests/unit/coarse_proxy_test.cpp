@@ -13,6 +13,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <ranges>
 #include <thread>
 #include <tuple>
 #include <vector>
@@ -295,6 +296,11 @@ class CoarseProxyDisplay : public test::BackendTest {
     goes_on_ = true;
     changed_.notify_all();
   }
+  /// The next load pauses as the first one did.
+  void stand_again() {
+    const std::scoped_lock lock(mutex_);
+    stands_ = goes_on_ = false;
+  }
   viewer::FrameResult render(double budget_ms = 1e4) {
     viewer::Frame frame;
     frame.target = viewer::Target::none;
@@ -303,12 +309,17 @@ class CoarseProxyDisplay : public test::BackendTest {
     frame.budget_ms = budget_ms;
     return viewer_->render(frame);
   }
-  /// The mean opacity of the image after some frames.
-  double opacity() {
+  /// The image after some frames.
+  std::vector<float> picture() {
     viewer::FrameResult result;
     for (int i = 0; i < 6 || result.preview || result.size.x != size; ++i) result = render(200.0);
     std::vector<float> rgba(std::size_t{4} * size * size);
     viewer_->read_linear(rgba.data(), rgba.size());
+    return rgba;
+  }
+  /// The mean opacity of that image.
+  double opacity() {
+    const std::vector<float> rgba = picture();
     double sum = 0.0;
     for (std::size_t i = 3; i < rgba.size(); i += 4) sum += double{rgba[i]};
     return sum / (size * size);
@@ -364,6 +375,42 @@ TEST_P(CoarseProxyDisplay, ProxyIsShownUntilTheFullVolumeIsLoaded) {
   viewer_->set_volume(nullptr);
   load(1'000'000);
   EXPECT_EQ(finished(), with);
+}
+
+// Compared with the proxy's own volume, shown with each setting.
+TEST_P(CoarseProxyDisplay, ProxyHasTheInterpolationOfTheGridSettings) {
+  std::optional<volume::Proxy> proxy;
+  volume::import_frame((path_ / "large.vdb"), {}, Log(), nullptr,
+                       {[&](volume::Proxy made) { proxy = std::move(made); }, 1});
+  ASSERT_TRUE(proxy);
+  viewer_->camera()->set(test::camera_at({35.0, 25.0, 40.0}, {5.0, 5.0, 5.0}, 25.0));
+  viewer_->set_sampling({1, 0, {render::View::density, true}});
+  for (const render::March march : {render::March::tet, render::March::dense, render::March::brick}) {
+    SCOPED_TRACE(static_cast<int>(march));
+    viewer::GridSettings grid;
+    grid.build.march = march;
+    grid.build.interpolation = grid::Interpolation::linear;
+    viewer_->set_grid(grid);
+    load();
+    wait_for_stand();
+    const std::vector<float> shown = picture();
+    viewer_->cancel();
+    go_on();
+    EXPECT_THROW(viewer_->wait(-1.0), Error);
+    const auto own = std::make_shared<const viewer::VolumeAsset>(proxy->frame);
+    viewer_->set_volume(own);
+    viewer_->wait(-1.0);
+    EXPECT_EQ(picture(), shown);
+    grid.build.interpolation = grid::Interpolation::nearest;
+    viewer_->set_grid(grid);
+    viewer_->wait(-1.0);
+    const std::vector<float> nearest = picture();
+    EXPECT_GT(std::ranges::count_if(std::views::iota(0U, nearest.size()),
+                                    [&](std::size_t i) { return std::abs(nearest[i] - shown[i]) > 0.02F; }),
+              static_cast<std::ptrdiff_t>(nearest.size() / 20));
+    viewer_->set_volume(nullptr);
+    stand_again();
+  }
 }
 
 TEST_P(CoarseProxyDisplay, ProxyDisappearsWithACancelledLoad) {
