@@ -53,11 +53,13 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
     };
     app.add_option_function<std::string>(name, set, help)->type_name("DIR")->group(group);
   };
-  add_folder("--shader-cache", options.shader_cache, "Cache compiled shaders in this folder");
-  add_folder("--shaders", options.shaders,
+  add_folder("--shader-cache", options.viewer.shader_cache, "Cache compiled shaders in this folder");
+  add_folder("--shaders", options.viewer.shaders,
              "Load shaders from this folder (a copy of glsl/) and reload them when they change");
+  add_ocio_options(app, group, options.viewer.ocio);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
+  check_ocio_options(options.viewer.ocio);
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
   if (app.count("--scene") > 0) options.scene_file = app.get_option("--scene")->as<std::string>();

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "ocio_lut.hpp"
 #include "surface/draco_mesh.hpp"
 #include "surface/meshopt.hpp"
 #include "surface/webp.hpp"
@@ -37,6 +38,8 @@ TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
   const std::string webp = "is a WebP image, which this build of Cumulet does not read (CUMULET_WEBP=OFF)";
   EXPECT_EQ(error_of([] { (void)read_webp_size({}); }), webp);
   EXPECT_EQ(error_of([] { (void)decode_webp({}, {}); }), webp);
+  EXPECT_EQ(error_of([] { (void)cumulet::demo::bake_ocio_view({.config = "a.ocio"}); }),
+            "--ocio a.ocio: this program was built without OpenColorIO (CUMULET_OCIO)");
 }
 
 }  // namespace
