@@ -17,9 +17,10 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
       "Preferences are stored in $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config.\n"
       "Copies of unsaved changes are stored in $XDG_STATE_HOME/cumulet, or below ~/.local/state.\n"
       "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.");
-  app.add_option("file", options.open,
-                 "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw), surfaces (.gltf, .glb), environment (.hdr, .exr) or "
-                 "scene (.json)")
+  app.add_option(
+         "file", options.open,
+         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), surfaces (.gltf, .glb), environment (.hdr, .exr) or "
+         "scene (.json)")
       ->type_name("FILE");
   add_scene_options(app, options.scene);
 

@@ -190,8 +190,8 @@ class HelpFormatter final : public CLI::Formatter {
 
 void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_path(app, group, "--volume", "FILE", scene.volume,
-           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .vti, .raw), or a sequence such as "
-           "name.####.vdb");
+           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .vti, .raw, .tif), or a folder of "
+           ".tif slices, or a sequence such as name.####.vdb");
   add_text(app, group, "--grid-name", "NAME", scene.grid_name,
            "Density grid (default: density, else the most likely grid)");
   add_text(app, group, "--temperature-grid", "NAME", scene.temperature_grid,
@@ -323,8 +323,10 @@ enum class FileKind { volume, surfaces, scene };
 /// Detects the kind of a file by its extension, else by its content.
 FileKind kind_of(const std::string& path) {
   const std::string ending = ending_of(path);
-  constexpr std::array<std::string_view, 6> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "vti", "raw"};
+  constexpr std::array<std::string_view, 8> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "vti", "raw", "tif", "tiff"};
   if (std::ranges::find(volumes, ending) != volumes.end()) return FileKind::volume;
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return FileKind::volume;  // of slices
   if (ending == "gltf" || ending == "glb") return FileKind::surfaces;
   if (ending == "json") return FileKind::scene;
   std::string head(4096, '\0');
@@ -338,7 +340,7 @@ FileKind kind_of(const std::string& path) {
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
   throw UsageError(in_quotes(path) +
-                   " is not a volume (.vdb, .nvdb, .nrrd, .raw), glTF file (.gltf, .glb) or scene (.json)");
+                   " is not a volume (.vdb, .nvdb, .nrrd, .raw, .tif), glTF file (.gltf, .glb) or scene (.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
@@ -362,9 +364,9 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
       throw CLI::ValidationError("FILE", error.what());
     }
   };
-  app.add_option_function<std::vector<std::string>>(
-         "files", take,
-         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw), surfaces (.gltf, .glb) or scene (.json); at most one of each")
+  app.add_option_function<std::vector<std::string>>("files", take,
+                                                    "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), surfaces "
+                                                    "(.gltf, .glb) or scene (.json); at most one of each")
       ->type_name("FILE");
 }
 

@@ -9,6 +9,7 @@
 #include "surface/draco_mesh.hpp"
 #include "surface/meshopt.hpp"
 #include "surface/webp.hpp"
+#include "volume/array_file.hpp"
 #include "volume/import_detail.hpp"
 
 namespace {
@@ -30,6 +31,10 @@ TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
             "is an OpenVDB file, which this build of Cumulet does not read (CUMULET_OPENVDB=OFF)");
   EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_nanovdb(nullptr, nullptr); }),
             "is a NanoVDB file, which this build of Cumulet does not read (CUMULET_NANOVDB=OFF)");
+  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_tiff(nullptr, nullptr); }),
+            "is a TIFF file, which this build of Cumulet does not read (CUMULET_TIFF=OFF)");
+  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_tiff_slices({}, nullptr); }),
+            "is a folder of TIFF files, which this build of Cumulet does not read (CUMULET_TIFF=OFF)");
   EXPECT_EQ(error_of([&] { (void)decode_draco({}, nullptr, "mesh 0", budget); }),
             "mesh 0 is compressed by Draco, which this build of Cumulet does not read (CUMULET_DRACO=OFF)");
   EXPECT_EQ(error_of([&] { (void)decode_meshopt({}, {}, nullptr, "buffer view 1", budget); }),
