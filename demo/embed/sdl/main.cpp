@@ -77,8 +77,8 @@ class Panels {
     glColor3f(1.0F, 1.0F, 1.0F);
   }
 
-  void draw_left() const { glDrawArrays(GL_QUADS, 0, 4); }
-  void draw_right() const { glDrawArrays(GL_QUADS, 4, 4); }
+  static void draw_left() { glDrawArrays(GL_QUADS, 0, 4); }
+  static void draw_right() { glDrawArrays(GL_QUADS, 4, 4); }
   /// Draws the board above the viewer's image, which shows through its holes.
   void draw_label() const { glCallList(label_); }
 
@@ -210,14 +210,14 @@ bool draw(Host& host, const Panels& panels) {
   if (width != host.width || height != host.height) glViewport(0, 0, width, height);
   host.width = width, host.height = height;
   glClear(GL_COLOR_BUFFER_BIT);
-  panels.draw_left();
+  Panels::draw_left();
   // GlStatePolicy::restore, the default: all state is as before after the call.
   const cumulet::FrameResult frame =
       must(host.viewer.render({.budget_ms = 15.0,
                                .width = static_cast<std::uint32_t>(width),
                                .height = static_cast<std::uint32_t>(height),
                                .viewport = {host.panel(), 0, width - 2 * host.panel(), height}}));
-  panels.draw_right();
+  Panels::draw_right();
   panels.draw_label();
   if (const GLenum error = glGetError(); error != GL_NO_ERROR) fail("OpenGL error " + std::to_string(error));
   if (frame.has(cumulet::RenderFlags::failed)) fail(must(host.viewer.get_progress()).message.c_str());
