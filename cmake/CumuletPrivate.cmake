@@ -21,6 +21,7 @@ set(archives_of_OpenVDB::openvdb "openvdb|boost_iostreams|tbb|blosc|lz4|snappy|z
 set(archives_of_TinyGLTF::TinyGLTF "tinygltf")
 set(archives_of_draco::draco "draco")
 set(archives_of_meshoptimizer::meshoptimizer "meshoptimizer")
+set(archives_of_TIFF::TIFF "tiff|webp|sharpyuv|zstd|lzma|Lerc|jbig|jpeg|deflate|z")
 set(archives_of_Cumulet::WebP "webp|sharpyuv")
 
 # Sets CUMULET_ARCHIVE_NAME to a static library of position-independent code, or to a name that ends in NOTFOUND.

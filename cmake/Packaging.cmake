@@ -153,6 +153,9 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs ${PROJECT_SOURCE_DIR}/third_party_n
 
 include(Reference)
 
+# Example hosts to copy from, a project of its own.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/demo/embed/ DESTINATION ${doc_dir}/examples/embed COMPONENT development)
+
 # --- cpack -----------------------------------------------------------------------------------------------------
 if(PROJECT_IS_TOP_LEVEL)
   set(CUMULET_MAINTAINER "Cumulet <cumulet@localhost>" CACHE STRING "Whom a Debian package names for questions")

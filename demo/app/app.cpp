@@ -39,9 +39,7 @@ constexpr double picture_frame = 0.15;    // maximum seconds that the window wai
 }  // namespace
 
 App::App(DemoOptions options)
-    : options_(std::move(options)),
-      preferences_path_(preferences_path()),
-      pictures_(options_.shader_cache, options_.shaders) {
+    : options_(std::move(options)), preferences_path_(preferences_path()), pictures_(options_.viewer) {
   model_.scene = options_.scene;
   model_.scene_path = options_.scene_file;
   model_.unchosen_ground = options_.unchosen_ground;
@@ -66,9 +64,8 @@ App::App(DemoOptions options)
     throw std::runtime_error("the OpenGL functions cannot be loaded");
   image_.emplace(model_, exchange_, window_->input());
   context_ = window_->make_shared_context();
-  renderer_ =
-      std::make_unique<Renderer>(*gl_, context_.get(), Window::wake, options_.trace.empty() ? nullptr : &timeline_,
-                                 options_.shader_cache, options_.shaders);
+  renderer_ = std::make_unique<Renderer>(*gl_, context_.get(), Window::wake,
+                                         options_.trace.empty() ? nullptr : &timeline_, options_.viewer);
   // The scene's size is that of a rendered image. The window has its own size.
   model_.scene.width = 1280;
   model_.scene.height = 720;

@@ -46,7 +46,7 @@ struct App::Commands {
       {Action::open_dialog,
        [](App& app, const Command&) {
          app.open_dialog("Open", Action::open,
-                         {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw", ".gltf", ".glb", ".hdr", ".exr", ".json"});
+                         {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw", ".tif", ".tiff", ".gltf", ".glb", ".hdr", ".exr", ".json"});
        }},
       {Action::open,
        [](App& app, const Command& command) {
@@ -55,7 +55,7 @@ struct App::Commands {
        }},
       {Action::add_volume_dialog,
        [](App& app, const Command&) {
-         app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw"});
+         app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw", ".tif", ".tiff"});
        }},
       {Action::add_volume,
        [](App& app, const Command& command) {

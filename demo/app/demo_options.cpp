@@ -17,9 +17,10 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
       "Preferences are stored in $XDG_CONFIG_HOME/cumulet/demo.json, or below ~/.config.\n"
       "Copies of unsaved changes are stored in $XDG_STATE_HOME/cumulet, or below ~/.local/state.\n"
       "Exit status: 0 success; 1 failure, with one line on standard error; 2 wrong usage.");
-  app.add_option("file", options.open,
-                 "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw), surfaces (.gltf, .glb), environment (.hdr, .exr) or "
-                 "scene (.json)")
+  app.add_option(
+         "file", options.open,
+         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), surfaces (.gltf, .glb), environment (.hdr, .exr) or "
+         "scene (.json)")
       ->type_name("FILE");
   add_scene_options(app, options.scene);
 
@@ -53,11 +54,13 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
     };
     app.add_option_function<std::string>(name, set, help)->type_name("DIR")->group(group);
   };
-  add_folder("--shader-cache", options.shader_cache, "Cache compiled shaders in this folder");
-  add_folder("--shaders", options.shaders,
+  add_folder("--shader-cache", options.viewer.shader_cache, "Cache compiled shaders in this folder");
+  add_folder("--shaders", options.viewer.shaders,
              "Load shaders from this folder (a copy of glsl/) and reload them when they change");
+  add_ocio_options(app, group, options.viewer.ocio);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
+  check_ocio_options(options.viewer.ocio);
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
   if (app.count("--scene") > 0) options.scene_file = app.get_option("--scene")->as<std::string>();

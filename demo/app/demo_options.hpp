@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "viewer_setup.hpp"
+
 namespace cumulet::demo {
 
 struct DemoOptions {
@@ -17,9 +19,8 @@ struct DemoOptions {
   double ui_scale = 0.0;         // 0: content scale of the screen
   std::string replay;
   std::string record;
-  std::string trace;         // empty: none
-  std::string shader_cache;  // folder; empty: none
-  std::string shaders;       // folder; empty: none
+  std::string trace;  // empty: none
+  ViewerSetup viewer;
 };
 
 /// Parses the arguments of cumulet-demo, without the program's name. Returns nullopt for --help and --version, whose

@@ -18,9 +18,8 @@ class CurrentContext {
 
 }  // namespace
 
-PictureRenderer::PictureRenderer(std::string shader_cache, std::string shaders)
-    : shader_cache_(std::move(shader_cache)),
-      shaders_(std::move(shaders)),
+PictureRenderer::PictureRenderer(ViewerSetup setup)
+    : setup_(std::move(setup)),
       queue_([this](const PictureJob& job, const PictureWatch& watch) { return render(job, watch); }, Window::wake) {}
 
 void PictureRenderer::add(PictureJob job) {
@@ -32,7 +31,7 @@ std::string PictureRenderer::render(const PictureJob& job, const PictureWatch& w
   const CurrentContext current(context_.get());
   // The session is destroyed after each job, which frees its GPU memory.
   Session session(
-      Window::get_proc, nullptr, [] {}, nullptr, shader_cache_, shaders_);
+      Window::get_proc, nullptr, [] {}, nullptr, setup_);
   return PictureRun(session, job, watch).run();
 }
 

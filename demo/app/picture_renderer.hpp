@@ -3,6 +3,7 @@
 #include <string>
 
 #include "render_queue.hpp"
+#include "viewer_setup.hpp"
 #include "window.hpp"
 
 namespace cumulet::demo {
@@ -11,8 +12,7 @@ namespace cumulet::demo {
 /// thread.
 class PictureRenderer {
  public:
-  /// shader_cache, shaders: folders, or "".
-  PictureRenderer(std::string shader_cache, std::string shaders);
+  explicit PictureRenderer(ViewerSetup setup);
 
   /// Adds a job to the queue. The first one creates the context, for which the window must exist. Throws
   /// std::runtime_error, one line, if the driver refuses that.
@@ -23,8 +23,7 @@ class PictureRenderer {
  private:
   [[nodiscard]] std::string render(const PictureJob& job, const PictureWatch& watch) const;
 
-  std::string shader_cache_;
-  std::string shaders_;
+  ViewerSetup setup_;
   Window::Context context_;
   RenderQueue queue_;  // its thread uses the context
 };

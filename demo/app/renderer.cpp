@@ -15,13 +15,8 @@ constexpr GLuint64 patience = 10'000'000'000;            // timeout for the GPU 
 }  // namespace
 
 Renderer::Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline,
-                   std::string shader_cache, std::string shaders)
-    : window_gl_(&gl),
-      context_(context),
-      wake_(std::move(wake)),
-      timeline_(timeline),
-      shader_cache_(std::move(shader_cache)),
-      shaders_(std::move(shaders)) {
+                   ViewerSetup setup)
+    : window_gl_(&gl), context_(context), wake_(std::move(wake)), timeline_(timeline), setup_(std::move(setup)) {
   std::promise<void> ready;
   auto started = ready.get_future();
   thread_ = std::thread([this, &ready] { work(ready); });
@@ -100,7 +95,7 @@ void Renderer::work(std::promise<void>& ready) {
           }
           changed_.notify_one();
         },
-        timeline_, shader_cache_, shaders_);
+        timeline_, setup_);
     {
       const std::lock_guard lock(mutex_);
       session_ = std::move(session);

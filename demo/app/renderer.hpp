@@ -30,9 +30,9 @@ class Renderer {
  public:
   /// gl: the window's functions. context: shares objects with the window's, is current in no thread, and must outlive
   /// the renderer. wake: called from any thread when there is an answer. timeline: receives trace events, or null.
-  /// shader_cache, shaders: folders, or "". Throws std::runtime_error.
+  /// Throws std::runtime_error.
   Renderer(const GladGLContext& gl, GLFWwindow* context, std::function<void()> wake, Timeline* timeline,
-           std::string shader_cache, std::string shaders);
+           ViewerSetup setup);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
   /// Cancels running work and stops the thread.
@@ -73,8 +73,7 @@ class Renderer {
   GLFWwindow* context_;
   std::function<void()> wake_;
   Timeline* timeline_;
-  std::string shader_cache_;
-  std::string shaders_;
+  ViewerSetup setup_;
 
   // Used only by the viewer's thread.
   std::unique_ptr<GladGLContext> gl_;

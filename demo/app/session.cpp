@@ -50,7 +50,7 @@ bool same_request(const DesiredState& a, const DesiredState& b) {
 }
 
 Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
-                 const std::string& shader_cache, const std::string& shaders)
+                 const ViewerSetup& setup)
     : shared_(std::make_unique<Shared>()) {
   shared_->wake = std::move(wake);
   cumulet_create_desc desc{};
@@ -65,12 +65,18 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
     desc.trace = Timeline::add;
     desc.trace_user = timeline;
   }
-  const auto programs = make_programs(shader_cache, shaders);
+  const auto programs = make_programs(setup.shader_cache, setup.shaders);
   desc.shader_cache = programs.get();
   cumulet_viewer* viewer = nullptr;
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
   viewer_.reset(viewer);
+  if (!setup.ocio.config.empty()) {
+    const DisplayLut lut = bake_ocio_view(setup.ocio);
+    const cumulet_display_lut_desc lut_desc = desc_of(lut);
+    if (cumulet_set_display_lut(viewer_.get(), &lut_desc) != CUMULET_OK)
+      throw std::runtime_error(cumulet_last_error(viewer_.get()));
+  }
   cumulet_camera* camera = nullptr;
   if (cumulet_get_camera(viewer_.get(), &camera) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(viewer_.get()));

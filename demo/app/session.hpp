@@ -20,6 +20,7 @@
 #include "model.hpp"
 #include "picture_job.hpp"
 #include "viewer_file.hpp"
+#include "viewer_setup.hpp"
 
 namespace cumulet::demo {
 
@@ -119,7 +120,7 @@ class Session {
  public:
   /// wake: called from any thread when there is something new to draw. Throws std::runtime_error.
   Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::function<void()> wake, Timeline* timeline,
-          const std::string& shader_cache, const std::string& shaders);
+          const ViewerSetup& setup);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
   ~Session() = default;

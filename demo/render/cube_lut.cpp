@@ -20,7 +20,7 @@ class CubeReader {
  public:
   CubeReader(std::istream& file, const std::string& name) : file_(file), name_(name) {}
 
-  CubeLut read() {
+  DisplayLut read() {
     for (std::string text; std::getline(file_, text);) {
       ++line_;
       if (text.find('\0') != std::string::npos) fail("it is not a text");
@@ -85,29 +85,17 @@ class CubeReader {
   std::istream& file_;
   const std::string& name_;
   std::size_t line_ = 0;
-  CubeLut lut_;
+  DisplayLut lut_;
 };
 
 }  // namespace
 
-CubeLut read_cube_lut(std::istream& file, const std::string& name) { return CubeReader(file, name).read(); }
+DisplayLut read_cube_lut(std::istream& file, const std::string& name) { return CubeReader(file, name).read(); }
 
-CubeLut read_cube_lut(const std::string& path) {
+DisplayLut read_cube_lut(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error(path + ": cannot be opened");
   return read_cube_lut(file, path);
-}
-
-cumulet_display_lut_desc desc_of(const CubeLut& lut, cumulet_lut_shaper shaper) {
-  cumulet_display_lut_desc desc{};
-  desc.struct_size = sizeof desc;
-  desc.values = lut.values.data();
-  desc.value_count = lut.values.size();
-  desc.size = lut.size;
-  desc.shaper = shaper;
-  desc.domain_min = lut.domain_min;
-  desc.domain_max = lut.domain_max;
-  return desc;
 }
 
 }  // namespace cumulet::demo

@@ -37,6 +37,7 @@
 #include "memory.hpp"
 #include "messages.hpp"
 #include "models.hpp"
+#include "ocio_lut.hpp"
 #include "options.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
@@ -526,6 +527,20 @@ class Studio {
     models_.show(viewer_.get(), scene.models);
   }
 
+  void set_display_lut(const RenderOptions& options) {
+    cumulet::demo::DisplayLut lut;
+    if (!options.lut.empty()) {
+      lut = cumulet::demo::read_cube_lut(options.lut);
+      lut.shaper = options.lut_shaper;
+    } else if (!options.ocio.config.empty()) {
+      lut = cumulet::demo::bake_ocio_view(options.ocio);
+    } else {
+      return;
+    }
+    const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut);
+    check(viewer_, cumulet_set_display_lut(viewer_.get(), &desc));
+  }
+
   void set_scene(const RenderOptions& options) {
     const auto& scene = options.scene;
     cumulet_limits_desc limits{};
@@ -560,11 +575,7 @@ class Studio {
     cumulet_display_desc display = scene.display;
     display.denoise = CUMULET_DENOISE_OFF;  // the image is read without denoising, and denoised separately
     check(viewer_, cumulet_set_display(viewer_.get(), &display));
-    if (!options.lut.empty()) {
-      const cumulet::demo::CubeLut lut = cumulet::demo::read_cube_lut(options.lut);
-      const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut, options.lut_shaper);
-      check(viewer_, cumulet_set_display_lut(viewer_.get(), &desc));
-    }
+    set_display_lut(options);
     cumulet::demo::show_camera(viewer_, scene);
     if (!scene.models.empty()) check(viewer_, cumulet_set_surface_settings(viewer_.get(), &scene.surface));
     if (!scene.surfaces.empty()) {

@@ -190,8 +190,8 @@ class HelpFormatter final : public CLI::Formatter {
 
 void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_path(app, group, "--volume", "FILE", scene.volume,
-           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .vti, .raw), or a sequence such as "
-           "name.####.vdb");
+           "OpenVDB or NanoVDB file (.vdb, .nvdb), or dense array (.nrrd, .nhdr, .vti, .raw, .tif), or a folder of "
+           ".tif slices, or a sequence such as name.####.vdb");
   add_text(app, group, "--grid-name", "NAME", scene.grid_name,
            "Density grid (default: density, else the most likely grid)");
   add_text(app, group, "--temperature-grid", "NAME", scene.temperature_grid,
@@ -323,8 +323,10 @@ enum class FileKind { volume, surfaces, scene };
 /// Detects the kind of a file by its extension, else by its content.
 FileKind kind_of(const std::string& path) {
   const std::string ending = ending_of(path);
-  constexpr std::array<std::string_view, 6> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "vti", "raw"};
+  constexpr std::array<std::string_view, 8> volumes = {"vdb", "nvdb", "nrrd", "nhdr", "vti", "raw", "tif", "tiff"};
   if (std::ranges::find(volumes, ending) != volumes.end()) return FileKind::volume;
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return FileKind::volume;  // of slices
   if (ending == "gltf" || ending == "glb") return FileKind::surfaces;
   if (ending == "json") return FileKind::scene;
   std::string head(4096, '\0');
@@ -338,7 +340,7 @@ FileKind kind_of(const std::string& path) {
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
   throw UsageError(in_quotes(path) +
-                   " is not a volume (.vdb, .nvdb, .nrrd, .raw), glTF file (.gltf, .glb) or scene (.json)");
+                   " is not a volume (.vdb, .nvdb, .nrrd, .raw, .tif), glTF file (.gltf, .glb) or scene (.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
@@ -362,9 +364,9 @@ void add_files(CLI::App& app, SceneOptions& scene, bool& lit) {
       throw CLI::ValidationError("FILE", error.what());
     }
   };
-  app.add_option_function<std::vector<std::string>>(
-         "files", take,
-         "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw), surfaces (.gltf, .glb) or scene (.json); at most one of each")
+  app.add_option_function<std::vector<std::string>>("files", take,
+                                                    "Volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), surfaces "
+                                                    "(.gltf, .glb) or scene (.json); at most one of each")
       ->type_name("FILE");
 }
 
@@ -598,6 +600,7 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
                         Name{"linear", CUMULET_LUT_SHAPER_LINEAR}},
              options.lut_shaper,
              "Values that the LUT maps: the sRGB curve, log2 or the value itself of exposed radiance (default: srgb)");
+  add_ocio_options(app, group, options.ocio);
   add_path(app, group, "--shader-cache", "DIR", options.shader_cache, "Cache compiled shaders in this folder");
   add_path(app, group, "--shaders", "DIR", options.shaders,
            "Load shaders from this folder (a copy of glsl/), to compare variants without a build (default: built in)");
@@ -651,6 +654,24 @@ void make_thumbnail(const CLI::App& app, RenderOptions& options) {
 
 }  // namespace
 
+void add_ocio_options(CLI::App& app, const char* group, OcioView& view) {
+  add_path(app, group, "--ocio", "FILE", view.config,
+           "OpenColorIO configuration; its view replaces the tone map (default: none)");
+  add_text(app, group, "--ocio-display", "NAME", view.display,
+           "Display of --ocio (default: that of the configuration)");
+  add_text(app, group, "--ocio-view", "NAME", view.view, "View of --ocio (default: that of the display)");
+  add_text(app, group, "--ocio-input", "NAME", view.input,
+           "Color space of --ocio that is linear Rec. 709 (default: found by its name, else by the role "
+           "aces_interchange)");
+}
+
+void check_ocio_options(const OcioView& view) {
+  if (!view.config.empty()) return;
+  for (const auto& [flag, name] : {std::pair{"--ocio-display", &view.display}, std::pair{"--ocio-view", &view.view},
+                                   std::pair{"--ocio-input", &view.input}})
+    if (!name->empty()) throw UsageError(std::string(flag) + " needs --ocio");
+}
+
 std::optional<RenderOptions> parse_render_options(std::vector<std::string> arguments, std::ostream& out) {
   RenderOptions options;
   CLI::App app("Path-traces a volume to an image file, without a display.", "cumulet-render");
@@ -698,6 +719,10 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
     throw UsageError("--light-groups needs an .exr output");
   const bool part = app.count("--first-sample") > 0;
   if (!options.lut.empty() && options.format != OutputFormat::png) throw UsageError("--lut needs a .png output");
+  check_ocio_options(options.ocio);
+  if (!options.ocio.config.empty() && options.format != OutputFormat::png)
+    throw UsageError("--ocio needs a .png output");
+  if (!options.ocio.config.empty() && !options.lut.empty()) throw UsageError("--ocio and --lut exclude each other");
   if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   options.denoises_by_default = app.count("--denoise") == 0;
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "ocio_lut.hpp"
 #include "option_values.hpp"
 
 namespace CLI {
@@ -22,6 +23,10 @@ namespace cumulet::demo {
 /// stays black if no flag sets it: see finish_scene_options. The scene must outlive the app's parse(), which throws the
 /// exceptions of load_scene.
 void add_scene_options(CLI::App& app, SceneOptions& scene);
+/// Adds --ocio and the flags that choose its view.
+void add_ocio_options(CLI::App& app, const char* group, OcioView& view);
+/// Throws UsageError for flags without --ocio.
+void check_ocio_options(const OcioView& view);
 /// Kinds of files that were named without a flag.
 struct NamedFiles {
   bool scene = false;  ///< a scene file, which sets the light
@@ -66,6 +71,7 @@ struct RenderOptions {
   std::optional<std::uint32_t> thumbnail;  // pixels per side
   std::string lut;                         // a .cube file; empty: none
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
+  OcioView ocio;
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };

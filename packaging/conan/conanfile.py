@@ -19,6 +19,7 @@ REQUIREMENTS = {
     "draco": ["draco/[>=1.5 <2]"],
     "meshopt": ["meshoptimizer/[>=0.18 <1]"],
     "openvdb": ["openvdb/[>=10 <14]"],
+    "tiff": ["libtiff/[>=4.5 <5]"],
     "webp": ["libwebp/[>=1.3.2 <2]"],
 }
 

@@ -63,6 +63,11 @@ std::unique_ptr<Reader> open_nrrd(std::unique_ptr<ByteSource> content,
 /// Opens a file of VTK's image data (.vti) whose arrays are appended as raw bytes.
 std::unique_ptr<Reader> open_vti(std::unique_ptr<ByteSource> content, Progress* progress);
 
+/// Opens a TIFF file, whose pages are slices of one number per pixel.
+std::unique_ptr<Reader> open_tiff(std::unique_ptr<ByteSource> content, Progress* progress);
+/// Opens TIFF files that are one slice each. files: not empty, in order.
+std::unique_ptr<Reader> open_tiff_slices(const std::vector<std::filesystem::path>& files, Progress* progress);
+
 /// Returns the JSON file that describes a .raw file: NAME.raw.json or NAME.json; nullopt if there is none.
 std::optional<std::filesystem::path> raw_description_of(const std::filesystem::path& file);
 /// Opens a file of numbers without a header.

@@ -155,6 +155,8 @@ class Reader {
 /// Opens a file; its format is recognized by content, not by name.
 std::unique_ptr<Reader> open(const std::filesystem::path& file, Progress* progress);
 std::unique_ptr<Reader> open(std::unique_ptr<ByteSource> content, Progress* progress);
+/// Returns the size of a file, or of a folder's slices. Throws std::filesystem::filesystem_error.
+std::uint64_t bytes_of(const std::filesystem::path& file);
 /// Returns the grid that import_volume reads for this name, or without a name. Throws as import_volume does.
 std::size_t choose_grid(const std::vector<GridInfo>& grids, const std::string& name);
 /// Returns the usable grid with this name, or else this unique name. Throws if there is none, or several.

@@ -139,7 +139,7 @@ std::array<std::uint64_t, histogram_bins> histogram(const ScalarVolume& volume) 
 Inspection::Inspection(const FilePath& file) : file_(file) {
   naming(file.given(), [&] {
     const std::unique_ptr<Reader> reader = open(file.absolute(), nullptr);
-    bytes_ = std::filesystem::file_size(file.absolute());
+    bytes_ = bytes_of(file.absolute());
     format_ = reader->format();
     metadata_ = reader->metadata();
     grids_ = reader->grids();

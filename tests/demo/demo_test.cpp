@@ -590,7 +590,9 @@ TEST(DemoOptions, AcceptSceneFlagsAndAFile) {
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--ui-scale", "nan"}, out)), UsageError);
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--shader-cache", ""}, out)), UsageError);
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--shaders", ""}, out)), UsageError);
-  EXPECT_EQ(parse_demo_options({"--shader-cache", "kept"}, out)->shader_cache, "kept");
+  EXPECT_EQ(parse_demo_options({"--shader-cache", "kept"}, out)->viewer.shader_cache, "kept");
+  EXPECT_EQ(parse_demo_options({"--ocio", "a.ocio", "--ocio-view", "Film"}, out)->viewer.ocio.view, "Film");
+  EXPECT_THROW(static_cast<void>(parse_demo_options({"--ocio-view", "Film"}, out)), UsageError);
 }
 
 TEST(DemoModel, ModelRemovesTheDefaultGround) {

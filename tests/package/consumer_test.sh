@@ -1,6 +1,7 @@
 #!/bin/bash
 # Programs build against a moved install tree, with find_package and with pkg-config: C, C++, and C++ with its own
-# OpenVDB, found in OPENVDB_MODULE_PATH. Usage: consumer_test.sh BUILD_DIR VERSION OPENVDB_MODULE_PATH
+# OpenVDB, found in OPENVDB_MODULE_PATH; and so do the installed example hosts.
+# Usage: consumer_test.sh BUILD_DIR VERSION OPENVDB_MODULE_PATH
 set -euo pipefail
 build=$1 version=$2 openvdb_module_path=$3
 here=$(cd "$(dirname "$0")" && pwd)
@@ -23,6 +24,16 @@ cmake --build "$work/build"
 expect_version "$work/build/consumer_c"
 expect_version "$work/build/consumer_cpp"
 "$work/build/consumer_openvdb"
+
+# The example hosts, from their installed sources.
+cmake -S "$prefix/share/doc/cumulet/examples/embed" -B "$work/hosts" -G Ninja -DCMAKE_PREFIX_PATH="$prefix"
+cmake --build "$work/hosts" --target cumulet-embed-egl cumulet-embed-glfw
+"$work/hosts/egl/cumulet-embed-egl" 2>"$work/usage" && exit 1
+grep -q "usage: " "$work/usage" || {
+  cat "$work/usage"
+  echo "consumer_test: the installed host does not run" >&2
+  exit 1
+}
 
 config=$(find "$prefix" -name cumulet.pc -printf %h)
 export PKG_CONFIG_PATH=$config

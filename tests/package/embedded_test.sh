@@ -43,7 +43,7 @@ for path in "-isystem $root/include" "$root/lib/libopenvdb"; do
   grep -qF -e "$path" "$work/build/build.ninja" || { echo "embedded_test: $path is not used" >&2; exit 1; }
 done
 
-for feature in OPENVDB NANOVDB DRACO MESHOPT WEBP; do
+for feature in OPENVDB NANOVDB DRACO MESHOPT TIFF WEBP; do
   configure "-DCUMULET_$feature=OFF"
   lower=$(tr '[:upper:]' '[:lower:]' <<<"$feature")
   grep -q "without_$lower.cpp" "$work/build/build.ninja"

@@ -16,6 +16,7 @@ PACKAGES = {
     "OpenVDB": ("openvdb", "openvdb"),
     "PkgConfig": None,
     "TBB": ("tbb", "onetbb"),
+    "TIFF": ("tiff", "libtiff"),
     "Threads": None,
     "TinyGLTF": ("tinygltf", "tinygltf"),
     "WebP": ("libwebp", "libwebp"),

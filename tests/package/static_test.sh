@@ -11,7 +11,7 @@ fail() { echo "static_test: $*" >&2; exit 1; }
 
 cmake -S "$here/embedded" -B "$work/build" -G Ninja -DCUMULET_SOURCE_DIR="$source" -DCUMULET_STATIC=ON \
   -DCUMULET_INSTALL=ON -DCUMULET_OPENVDB="$features" -DCUMULET_DRACO="$features" -DCUMULET_MESHOPT="$features" \
-  -DCUMULET_WEBP="$features"
+  -DCUMULET_TIFF="$features" -DCUMULET_WEBP="$features"
 cmake --build "$work/build"
 
 # --- files that need features -----------------------------------------------------------------------------------------

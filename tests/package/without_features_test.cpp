@@ -5,9 +5,11 @@
 #include <functional>
 #include <string>
 
+#include "ocio_lut.hpp"
 #include "surface/draco_mesh.hpp"
 #include "surface/meshopt.hpp"
 #include "surface/webp.hpp"
+#include "volume/array_file.hpp"
 #include "volume/import_detail.hpp"
 
 namespace {
@@ -29,6 +31,10 @@ TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
             "is an OpenVDB file, which this build of Cumulet does not read (CUMULET_OPENVDB=OFF)");
   EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_nanovdb(nullptr, nullptr); }),
             "is a NanoVDB file, which this build of Cumulet does not read (CUMULET_NANOVDB=OFF)");
+  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_tiff(nullptr, nullptr); }),
+            "is a TIFF file, which this build of Cumulet does not read (CUMULET_TIFF=OFF)");
+  EXPECT_EQ(error_of([] { (void)cumulet::volume::detail::open_tiff_slices({}, nullptr); }),
+            "is a folder of TIFF files, which this build of Cumulet does not read (CUMULET_TIFF=OFF)");
   EXPECT_EQ(error_of([&] { (void)decode_draco({}, nullptr, "mesh 0", budget); }),
             "mesh 0 is compressed by Draco, which this build of Cumulet does not read (CUMULET_DRACO=OFF)");
   EXPECT_EQ(error_of([&] { (void)decode_meshopt({}, {}, nullptr, "buffer view 1", budget); }),
@@ -37,6 +43,8 @@ TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
   const std::string webp = "is a WebP image, which this build of Cumulet does not read (CUMULET_WEBP=OFF)";
   EXPECT_EQ(error_of([] { (void)read_webp_size({}); }), webp);
   EXPECT_EQ(error_of([] { (void)decode_webp({}, {}); }), webp);
+  EXPECT_EQ(error_of([] { (void)cumulet::demo::bake_ocio_view({.config = "a.ocio"}); }),
+            "--ocio a.ocio: this program was built without OpenColorIO (CUMULET_OCIO)");
 }
 
 }  // namespace

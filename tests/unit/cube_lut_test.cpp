@@ -9,9 +9,9 @@
 
 namespace {
 
-using cumulet::demo::CubeLut;
+using cumulet::demo::DisplayLut;
 
-CubeLut read(const std::string& text) {
+DisplayLut read(const std::string& text) {
   std::istringstream file(text);
   return cumulet::demo::read_cube_lut(file, "look.cube");
 }
@@ -28,7 +28,7 @@ std::string refusal(const std::string& text) {
 const std::string points = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 0.5\n";
 
 TEST(CubeLut, AreRead) {
-  const CubeLut lut =
+  DisplayLut lut =
       read("# made by hand\r\nTITLE \"a look\"\nLUT_3D_SIZE 2\nDOMAIN_MIN -1 -1 -1\nDOMAIN_MAX 2 2 2\n\n" + points);
   EXPECT_EQ(lut.size, 2U);
   EXPECT_EQ(lut.domain_min, -1.0F);
@@ -36,7 +36,8 @@ TEST(CubeLut, AreRead) {
   ASSERT_EQ(lut.values.size(), 24U);
   EXPECT_EQ(lut.values[3], 1.0F);  // red is fastest
   EXPECT_EQ(lut.values[23], 0.5F);
-  const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut, CUMULET_LUT_SHAPER_LOG2);
+  lut.shaper = CUMULET_LUT_SHAPER_LOG2;
+  const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut);
   EXPECT_EQ(desc.value_count, 24U);
   EXPECT_EQ(desc.shaper, CUMULET_LUT_SHAPER_LOG2);
 }

@@ -289,6 +289,16 @@ TEST(Options, ALutIsForPngs) {
   EXPECT_EQ(usage_error(with({"--lut-input", "linear"})), "--lut-input needs --lut");
 }
 
+TEST(Options, AnOcioViewIsForPngs) {
+  const RenderOptions options = parse({"--ocio", "a.ocio", "--ocio-display", "sRGB", "--ocio-view", "Film"});
+  EXPECT_EQ(options.ocio, (OcioView{.config = "a.ocio", .display = "sRGB", .view = "Film"}));
+  EXPECT_EQ(parse({"--ocio", "a.ocio", "--ocio-input", "lin"}).ocio.input, "lin");
+  EXPECT_EQ(usage_error(with({"--ocio", "a.ocio", "-o", "a.exr"})), "--ocio needs a .png output");
+  EXPECT_EQ(usage_error(with({"--ocio", "a.ocio", "--lut", "a.cube"})), "--ocio and --lut exclude each other");
+  EXPECT_EQ(usage_error(with({"--ocio-view", "Film"})), "--ocio-view needs --ocio");
+  EXPECT_EQ(usage_error(with({"--ocio", ""})), "--ocio: the file's name is empty");
+}
+
 TEST(Options, PartialImageNeedsASampleRangeAndExr) {
   const RenderOptions part = parse({"-o", "a.exr", "--spp", "32", "--first-sample", "96"});
   EXPECT_EQ(part.scene.sampling.first_sample, 96u);

@@ -6,6 +6,7 @@ vcpkg_check_features(OUT_FEATURE_OPTIONS FEATURE_OPTIONS FEATURES
                      meshopt CUMULET_MESHOPT
                      nanovdb CUMULET_NANOVDB
                      openvdb CUMULET_OPENVDB
+                     tiff CUMULET_TIFF
                      webp CUMULET_WEBP)
 string(COMPARE EQUAL "${VCPKG_LIBRARY_LINKAGE}" "static" CUMULET_STATIC)
 vcpkg_cmake_configure(SOURCE_PATH "${SOURCE_PATH}"

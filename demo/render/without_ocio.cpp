@@ -1,0 +1,13 @@
+// Replaces ocio_lut.cpp in builds without OpenColorIO.
+
+#include <stdexcept>
+
+#include "ocio_lut.hpp"
+
+namespace cumulet::demo {
+
+DisplayLut bake_ocio_view(const OcioView& view) {
+  throw std::runtime_error("--ocio " + view.config + ": this program was built without OpenColorIO (CUMULET_OCIO)");
+}
+
+}  // namespace cumulet::demo
