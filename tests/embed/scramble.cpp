@@ -13,6 +13,7 @@
 #include "support/c_host.hpp"
 #include "support/gl_state.hpp"
 #include "support/gltf_seeds.hpp"
+#include "support/scrambling_host.hpp"
 
 namespace {
 

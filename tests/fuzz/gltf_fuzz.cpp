@@ -1,12 +1,11 @@
 // libFuzzer over the glTF importer: for any bytes, a scene that satisfies scene.hpp, or a one-line error. See
 // README.md.
 
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 
 #include "base/error.hpp"
+#include "finding.hpp"
 #include "support/gltf_check.hpp"
 #include "support/gltf_model.hpp"
 #include "surface/gltf_import.hpp"
@@ -15,12 +14,8 @@ extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, st
 
 namespace {
 
+using cumulet::fuzz::fail;
 using cumulet::test::Bytes;
-
-[[noreturn]] void fail(const std::string& why) {
-  std::fprintf(stderr, "gltf_fuzz: %s\n", why.c_str());
-  std::abort();
-}
 
 std::uint32_t word(const std::uint8_t* bytes) {
   std::uint32_t value = 0;

@@ -2,20 +2,16 @@
 // error. See README.md.
 
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
 
+#include "finding.hpp"
 #include "scene_file.hpp"
 
 namespace {
 
-[[noreturn]] void fail(const std::string& why) {
-  std::fprintf(stderr, "scene_fuzz: %s\n", why.c_str());
-  std::abort();
-}
+using cumulet::fuzz::fail;
 
 /// Paths are written in normal form: a//b is a/b.
 cumulet::demo::SceneOptions with_normal_names(cumulet::demo::SceneOptions scene) {

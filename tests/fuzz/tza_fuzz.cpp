@@ -1,14 +1,13 @@
 // libFuzzer over tensor archives and their networks: for any bytes, a network or a one-line error. See README.md.
 
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <span>
 #include <string>
 
 #include "base/error.hpp"
 #include "denoise/network.hpp"
 #include "denoise/tza.hpp"
+#include "finding.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
@@ -17,8 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const cumulet::Error& error) {
     const std::string line = error.what();
     if (!line.starts_with("fuzzed: ") || line.find_first_of("\n\r") != std::string::npos) {
-      std::fprintf(stderr, "tza_fuzz: not one line: %s\n", line.c_str());
-      std::abort();
+      cumulet::fuzz::fail("not one line: " + line);
     }
   }
   return 0;

@@ -6,22 +6,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <new>
 #include <string>
 
 #include "base/error.hpp"
+#include "finding.hpp"
 #include "volume/frame_import.hpp"
 #include "volume/inspection.hpp"
 #include "volume/volume.hpp"
 
 namespace {
 
-[[noreturn]] void fail(const std::string& why) {
-  std::fprintf(stderr, "volume_fuzz: %s\n", why.c_str());
-  std::abort();
-}
+using cumulet::fuzz::fail;
 
 /// Bytes in memory with a file name.
 class MemoryFile {

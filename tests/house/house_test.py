@@ -22,6 +22,7 @@ TABLE = """# Architecture
 | `src/gl` | function table | yes | `base` |
 | `src/viewer` | the viewer | yes | all above |
 | `demo/` | programs | yes | `base` |
+| `tests/` | tests | yes | all above |
 
 ## Threads
 
@@ -37,6 +38,7 @@ GOOD = {
     "src/gl/g.hpp": "#include <glad/gl.h>\nnamespace gl { struct Functions {}; }\n",
     "src/viewer/w.hpp": '#include "gl/g.hpp"\n#include "volume/v.hpp"\n',
     "demo/app/main.cpp": '#include "base/a.hpp"\nint main() { return 0; }\n',
+    "tests/unit/a_test.cpp": '#include "base/a.hpp"\n',
 }
 
 
@@ -365,6 +367,16 @@ class Rules(Checkout):
         self.write({"src/base/b.hpp": "\n" * 801, "demo/b.py": "\n" * 801})
         self.reported("demo/b.py: file demo/b.py: lines 801; limit: lines 800",
                       "src/base/b.hpp: file src/base/b.hpp: lines 801; limit: lines 800")
+
+    def test_a_file_of_tests_with_too_many_lines(self):
+        self.write({"tests/unit/b.cpp": "\n" * 600, "tests/farm/b.py": "\n" * 600})
+        self.passes()
+        self.write({"tests/unit/b.cpp": "\n" * 601, "tests/farm/b.py": "\n" * 601})
+        self.reported("tests/farm/b.py: file tests/farm/b.py: lines 601; limit: lines 600",
+                      "tests/unit/b.cpp: file tests/unit/b.cpp: lines 601; limit: lines 600")
+        self.bound("file tests/farm/b.py 601", "file tests/unit/b.cpp 700")
+        self.reported("bounds.txt: file tests/unit/b.cpp has become smaller")
+        self.updated("file tests/farm/b.py 601", "file tests/unit/b.cpp 601")
 
     def test_a_file_that_is_not_understood(self):
         self.write({"src/base/b.cpp": "int f() {\n"})

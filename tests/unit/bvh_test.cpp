@@ -1,4 +1,4 @@
-// The BVH compared with brute force in double precision, with adversarial rays, and on the GPU with the CPU.
+// The BVH compared with brute force in double precision and with adversarial rays.
 
 #include "surface/bvh.hpp"
 
@@ -15,10 +15,9 @@
 #include <random>
 
 #include "base/error.hpp"
-#include "support/backends.hpp"
 #include "support/gl_rays.hpp"
+#include "support/mesh_rays.hpp"
 #include "support/meshes.hpp"
-#include "support/osmesa_leaks.hpp"
 #include "surface/bvh_rays.hpp"
 
 // The same source with a cm_hit_accept.
@@ -44,14 +43,15 @@ namespace {
 using namespace cumulet;
 using core::BvhRays;
 using glm::dvec3;
-using glm::vec2;
 using glm::vec3;
-using Hit = BvhRays::CmHit;
 using surface::Bvh;
 using surface::TriangleFlags;
 using test::Mesh;
-
-Bvh build(const Mesh& mesh) { return Bvh::build(mesh.vertices, mesh.indices); }
+using test::MeshRay;
+using test::rays_at;
+using test::rays_out_of;
+using test::tree_of;
+using Hit = BvhRays::CmHit;
 
 // A hit in double precision. margin: the smallest barycentric coordinate, negative outside.
 struct Exact {
@@ -72,47 +72,13 @@ std::optional<Exact> exact_hit(const Mesh& mesh, std::size_t triangle, const dve
   return Exact{glm::dot(e2, q) / det, std::min({u, v, 1.0 - u - v})};
 }
 
-struct Ray {
-  vec3 o;
-  vec3 d;
-  float t_max = 1e30F;
-};
-
-// Rays from all directions through the mesh's bounds.
-std::vector<Ray> rays_at(const Mesh& mesh, std::size_t count, unsigned seed) {
-  std::mt19937 engine(seed);
-  std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
-  const auto bounds = mesh.bounds();
-  const vec3 low = bounds.first;
-  const vec3 high = bounds.second;
-  const auto point = [&](float grow) {
-    const vec3 r(uniform(engine), uniform(engine), uniform(engine));
-    return low + (high - low) * (0.5F + grow * (r - 0.5F));
-  };
-  std::vector<Ray> rays(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    rays[i].o = point(3.0F);
-    rays[i].d = (point(1.0F) - rays[i].o) * std::exp2(6.0F * uniform(engine) - 3.0F);
-    // Every third ray is parallel to an axis.
-    if (i % 3 == 0) {
-      const vec3 to = rays[i].d;
-      rays[i].d = vec3(0.0F);
-      rays[i].d[static_cast<int>(i / 3 % 3)] = (i / 9 % 2) == 0 ? 1.0F : -2.0F;
-      rays[i].o = rays[i].o + to - rays[i].d * glm::length(high - low) * 2.0F;
-    }
-    // Some rays end before they have passed the mesh.
-    if (i % 5 == 0) rays[i].t_max = 3.0F * uniform(engine);
-  }
-  return rays;
-}
-
 // Expects that every hit and miss is right, except where a ray grazes an edge within float precision.
 void expect_like_brute_force(const Mesh& mesh, std::size_t count, unsigned seed, double max_doubtful = 0.01) {
-  const Bvh bvh = build(mesh);
+  const Bvh bvh = tree_of(mesh);
   BvhRays rays{&bvh};
   std::size_t doubtful = 0;
   std::size_t hits = 0;
-  for (const Ray& ray : rays_at(mesh, count, seed)) {
+  for (const MeshRay& ray : rays_at(mesh, count, seed)) {
     const dvec3 o(ray.o);
     const dvec3 d(ray.d);
     double nearest = ray.t_max;
@@ -168,51 +134,11 @@ TEST(Bvh, MeshesMatchBruteForce) {
 
 TEST(Bvh, SliversMatchBruteForce) { expect_like_brute_force(test::slivers(1500, 8), 4000, 8, 0.7); }
 
-// Rays from inside a closed mesh towards difficult targets (vertices, edges).
-std::vector<Ray> rays_out_of(const Mesh& mesh, std::size_t count, unsigned seed) {
-  const auto [low, high] = mesh.bounds();
-  const vec3 middle = 0.5F * (low + high);
-  std::mt19937 engine(seed);
-  std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
-  std::vector<Ray> rays;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t triangle = engine() % (mesh.indices.size() / 3);
-    const vec3 a = mesh.corner(triangle, i % 3);
-    const vec3 b = mesh.corner(triangle, (i + 1) % 3);
-    vec3 o = middle;
-    if (i % 4 != 0) {
-      for (int axis = 0; axis < 3; ++axis) {
-        // Half of the origins lie in a plane of symmetry.
-        if (engine() % 2 == 0) o[axis] += 0.25F * (high - low)[axis] * (2.0F * uniform(engine) - 1.0F);
-      }
-    }
-    vec3 target = a;
-    if (i % 5 == 1) target = 0.5F * (a + b);
-    if (i % 5 == 2) target = a + (b - a) * uniform(engine);
-    if (i % 5 == 3) target = a + (b - a) * 1e-6F * uniform(engine);
-    vec3 d = target - o;
-    if (i % 7 == 0) {
-      // Directions along axes and diagonals.
-      d = vec3(float(engine() % 3) - 1.0F, float(engine() % 3) - 1.0F, float(engine() % 3) - 1.0F);
-      if (d == vec3(0.0F)) d.x = 1.0F;
-    }
-    if (i % 11 == 0) {
-      const int axis = static_cast<int>(engine() % 3);
-      const std::array<float, 5> tiny{0.0F, -0.0F, 1e-30F, -1e-20F, 1e-42F};
-      if (std::abs(d[(axis + 1) % 3]) > 0.0F) d[axis] = tiny[engine() % 5];
-    }
-    if (i % 13 == 0) d *= std::exp2(30.0F * uniform(engine) - 15.0F);
-    if (!(glm::length(d) > 0.0F)) continue;
-    rays.push_back({o, d, std::numeric_limits<float>::infinity()});
-  }
-  return rays;
-}
-
 std::size_t slips(const Mesh& mesh, std::size_t count, unsigned seed) {
-  const Bvh bvh = build(mesh);
+  const Bvh bvh = tree_of(mesh);
   BvhRays rays{&bvh};
   std::size_t slipped = 0;
-  for (const Ray& ray : rays_out_of(mesh, count, seed)) {
+  for (const MeshRay& ray : rays_out_of(mesh, count, seed)) {
     Hit hit{};
     const bool is_hit = rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit);
     slipped += is_hit && !hit.front && rays.cm_bvh_occluded(ray.o, ray.d, 0.0F, ray.t_max) ? 0 : 1;
@@ -237,7 +163,7 @@ bool same_hit(const Hit& a, const Hit& b) {
 
 TEST(Bvh, RefitMatchesARebuild) {
   const Mesh rest = test::soup(20000, 0.05F, 11);
-  Bvh bvh = build(rest);
+  Bvh bvh = tree_of(rest);
   const std::vector<Bvh::Node> before(bvh.nodes().begin(), bvh.nodes().end());
   bvh.refit(rest.vertices, rest.indices);
   EXPECT_EQ(std::memcmp(before.data(), bvh.nodes().data(), before.size() * sizeof(Bvh::Node)), 0) << "at rest";
@@ -252,11 +178,11 @@ TEST(Bvh, RefitMatchesARebuild) {
                         std::sin(angle) * v.position.x + std::cos(angle) * v.position.z);
     }
     bvh.refit(posed.vertices, posed.indices);
-    const Bvh anew = build(posed);
+    const Bvh anew = tree_of(posed);
     BvhRays refitted{&bvh};
     BvhRays rebuilt{&anew};
     std::size_t hits = 0;
-    for (const Ray& ray : rays_at(posed, 20000, 12)) {
+    for (const MeshRay& ray : rays_at(posed, 20000, 12)) {
       Hit a{};
       Hit b{};
       const bool is_hit = refitted.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, a);
@@ -276,12 +202,12 @@ TEST(Bvh, RefitMatchesARebuild) {
 TEST(Bvh, CostIsCloseToTheExpectedSteps) {
   // For a plane of n triangles, a good tree costs about log2(n) nodes. Splits at the median count cost far more.
   const Mesh plane = test::terrain(100);
-  EXPECT_LT(build(plane).cost(), 60.0);
-  EXPECT_GT(build(plane).cost(), 10.0);
+  EXPECT_LT(tree_of(plane).cost(), 60.0);
+  EXPECT_GT(tree_of(plane).cost(), 10.0);
   // Two distant clusters: the first split separates them.
   Mesh two = test::icosphere(3);
   two.append(test::moved(test::icosphere(3), vec3(1.0F), vec3(100.0F, 0.0F, 0.0F)));
-  const Bvh bvh = build(two);
+  const Bvh bvh = tree_of(two);
   const Bvh::Node& root = bvh.nodes()[0];
   EXPECT_LT(std::min(root.child[0].high.x, root.child[1].high.x), 2.0F);
   EXPECT_GT(std::max(root.child[0].low.x, root.child[1].low.x), 98.0F);
@@ -332,7 +258,7 @@ TEST(Bvh, EmptyAndTinyMeshesBuild) {
   EXPECT_EQ(none.cost(), 0.0);
   for (const std::size_t n : {0U, 1U, 2U, 3U, 4U, 5U, 6U, 17U}) {
     Mesh mesh = test::soup(n, 0.5F, 3);
-    Bvh bvh = build(mesh);
+    Bvh bvh = tree_of(mesh);
     expect_sound(bvh, n);
     bvh.refit(mesh.vertices, mesh.indices);
     expect_sound(bvh, n);
@@ -375,7 +301,7 @@ TEST(Bvh, InvalidTrianglesGiveAValidTree) {
     wide.vertices[i].position *= i % 2 == 0 ? 9e11F : 1e-30F;
   }
   for (const Mesh* mesh : {&one_point, &duplicates, &shrinking, &collinear, &unsound, &all_unsound, &wide}) {
-    Bvh bvh = build(*mesh);
+    Bvh bvh = tree_of(*mesh);
     expect_sound(bvh, mesh->indices.size() / 3);
     EXPECT_TRUE(std::isfinite(bvh.cost()));
     bvh.refit(mesh->vertices, mesh->indices);
@@ -395,15 +321,15 @@ TEST(Bvh, InvalidTrianglesGiveAValidTree) {
     }
   }
   // Triangles without area are not hit until a pose gives them some.
-  Bvh bvh = build(one_point);
+  Bvh bvh = tree_of(one_point);
   BvhRays rays{&bvh};
   Hit hit{};
   EXPECT_FALSE(rays.cm_bvh_closest(vec3(0.25F, -3.0F, 0.0F), vec3(0.0F, 0.0F, 1.0F), 0.0F, 100.0F, hit));
   const Mesh grown = test::soup(5000, 0.3F, 1);
   bvh.refit(grown.vertices, one_point.indices);
-  const Bvh anew = build(grown);
+  const Bvh anew = tree_of(grown);
   BvhRays expected{&anew};
-  for (const Ray& ray : rays_at(grown, 300, 3)) {
+  for (const MeshRay& ray : rays_at(grown, 300, 3)) {
     Hit other{};
     ASSERT_EQ(rays.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, hit),
               expected.cm_bvh_closest(ray.o, ray.d, 0.0F, ray.t_max, other));
@@ -417,7 +343,7 @@ TEST(Bvh, WrongSizesAndIndicesAreErrors) {
   const std::vector<std::uint32_t> nine(9);
   EXPECT_THROW(Bvh::build(mesh.vertices, std::span(indices).first(29)), Error);
   EXPECT_THROW(Bvh::build(mesh.vertices, indices, nine), Error);
-  Bvh bvh = build(mesh);
+  Bvh bvh = tree_of(mesh);
   EXPECT_THROW(bvh.refit(mesh.vertices, std::span(indices).first(27)), Error);
   EXPECT_THROW(bvh.refit(std::span(mesh.vertices).first(29), indices), Error);
   expect_sound(bvh, 10);
@@ -432,7 +358,7 @@ TEST(Bvh, IsTheSameForAnyNumberOfThreads) {
   for (const Mesh& mesh : {test::soup(150000, 0.02F, 21), test::terrain(250)}) {
     const auto build_with = [&](std::size_t threads) {
       const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-      return build(mesh);
+      return tree_of(mesh);
     };
     const Bvh one = build_with(1);
     for (const std::size_t threads : {2U, 8U}) {
@@ -522,7 +448,7 @@ TEST(Bvh, OffsetOriginsLeaveTheirSurface) {
   for (const float scale : {0.01F, 1.0F, 100.0F}) {
     for (const float away : {0.0F, 1.0F, 30.0F}) {
       const Mesh mesh = test::moved(test::icosphere(3), vec3(scale), vec3(away, -away, 2.0F * away) * scale);
-      const Bvh bvh = build(mesh);
+      const Bvh bvh = tree_of(mesh);
       BvhRays rays{&bvh};
       const auto [low, high] = mesh.bounds();
       std::size_t again = 0;
@@ -544,76 +470,6 @@ TEST(Bvh, OffsetOriginsLeaveTheirSurface) {
       EXPECT_EQ(again, 0U) << scale << " " << away;
     }
   }
-}
-
-class BvhGl : public test::BackendTest {};
-CUMULET_ON_BACKENDS(BvhGl);
-
-TEST_P(BvhGl, ShadersMatchTheCpu) {
-  const test::GlRays gl(*context_, "");
-  for (const Mesh& mesh : {test::soup(20000, 0.05F, 31), test::terrain(60), test::slivers(2000, 33), test::icosphere(4),
-                           test::soup(1, 1.0F, 35), Mesh()}) {
-    const Bvh bvh = build(mesh);
-    BvhRays rays{&bvh};
-    std::vector<test::GlRay> all;
-    for (const Ray& r : rays_at(mesh.indices.empty() ? test::cube(1) : mesh, 20000, 34)) {
-      all.push_back({r.o, 0.0F, r.d, r.t_max});
-    }
-    const std::vector<test::GlHit> hits = gl.trace(bvh, all);
-    std::size_t different = 0;
-    std::size_t hit_count = 0;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      Hit hit{};
-      const bool expected = rays.cm_bvh_closest(all[i].o, all[i].d, 0.0F, all[i].t_max, hit);
-      hit_count += expected ? 1 : 0;
-      ASSERT_EQ(hits[i].triangle != CM_BVH_NONE, hits[i].occluded != 0) << i;
-      // GPU division may round differently. Hits at an edge, a needle or the ray's end may differ.
-      if (hits[i].triangle != hit.triangle) {
-        ++different;
-        continue;
-      }
-      if (!expected) continue;
-      ASSERT_NEAR(hits[i].t, hit.t, 1e-5F * (1.0F + std::abs(hit.t))) << i;
-      ASSERT_EQ(hits[i].front != 0, hit.front) << i;
-      ASSERT_NEAR(hits[i].barycentrics.x, hit.barycentrics.x, 1e-2F) << i;
-      ASSERT_NEAR(hits[i].barycentrics.y, hit.barycentrics.y, 1e-2F) << i;
-    }
-    EXPECT_LE(different, all.size() / 500) << mesh.indices.size();
-    EXPECT_GE(hit_count, mesh.indices.size() < 4 ? 0U : all.size() / 20);
-  }
-}
-
-TEST_P(BvhGl, NoRaySlipsOutOfAClosedMesh) {
-  // Holds for every contraction into fused operations that the driver chooses.
-  const test::GlRays gl(*context_, "");
-  for (const Mesh& mesh : {test::icosphere(4), test::cube(5),
-                           test::moved(test::icosphere(3), vec3(1.0F), vec3(1000.0F, -300.0F, 77.0F))}) {
-    const Bvh bvh = build(mesh);
-    std::vector<test::GlRay> all;
-    for (const Ray& r : rays_out_of(mesh, 200000, 41)) all.push_back({r.o, 0.0F, r.d, r.t_max});
-    std::size_t slipped = 0;
-    for (const test::GlHit& hit : gl.trace(bvh, all)) slipped += hit.occluded != 0 && hit.front == 0 ? 0 : 1;
-    EXPECT_EQ(slipped, 0U);
-  }
-}
-
-TEST_P(BvhGl, AnyHitFunctionDecidesOnFlaggedTriangles) {
-  const test::GlRays gl(*context_, "return (triangle & 1u) == 1u && barycentrics.x > 0.3;");
-  const Mesh mesh = test::soup(5000, 0.1F, 51);
-  std::vector<std::uint32_t> flags(5000);
-  for (std::size_t i = 0; i < flags.size(); ++i) flags[i] = i % 3 == 0 ? 0 : TriangleFlags::ask;
-  const Bvh bvh = Bvh::build(mesh.vertices, mesh.indices, flags);
-  std::vector<test::GlRay> all;
-  for (const Ray& r : rays_at(mesh, 20000, 52)) all.push_back({r.o, 0.0F, r.d, r.t_max});
-  std::array<std::size_t, 3> kinds{};
-  for (const test::GlHit& hit : gl.trace(bvh, all)) {
-    if (hit.triangle == CM_BVH_NONE) continue;
-    ++kinds[flags[hit.triangle] == 0 ? 0 : 1];
-    kinds[2] += flags[hit.triangle] != 0 && (hit.triangle % 2 == 0 || hit.barycentrics.x <= 0.3F) ? 1 : 0;
-  }
-  EXPECT_GT(kinds[0], 1000U);
-  EXPECT_GT(kinds[1], 500U);
-  EXPECT_EQ(kinds[2], 0U);
 }
 
 }  // namespace

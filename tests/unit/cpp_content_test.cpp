@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "support/file_bytes.hpp"
 #include "support/folder.hpp"
 #include "support/openvdb.hpp"
 #include "support/radiance.hpp"
@@ -19,11 +20,6 @@
 namespace {
 
 using namespace cumulet;
-
-std::string content_of(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 TEST(CppContent, VolumesComeFromBytesAndStreams) {
   openvdb::initialize();
@@ -38,7 +34,7 @@ TEST(CppContent, VolumesComeFromBytesAndStreams) {
   }
   const std::string file = (folder / "cloud.vdb").string();
   openvdb::io::File(file).write(grids);
-  const std::string content = content_of(file);
+  const std::string content = test::bytes_of(file);
   const auto bytes = std::as_bytes(std::span(content));
   const Volume memory = Volume::from_memory(bytes, {.grid_name = "other"}).value();
   EXPECT_STREQ(memory.info()->name.c_str(), "other");
@@ -68,7 +64,7 @@ TEST(CppContent, EnvironmentsComeFromBytesAndStreams) {
   const std::string hdr = (folder / "sky.hdr").string();
   std::ofstream(hdr, std::ios::binary) << test::radiance_file(8, 4);
   for (const std::string& file : {hdr, open_exr_file(folder)}) {
-    const std::string content = content_of(file);
+    const std::string content = test::bytes_of(file);
     const auto bytes = std::as_bytes(std::span(content));
     const EnvironmentInfo whole = Environment::open(file)->info().value();
     const EnvironmentInfo memory = Environment::from_memory(bytes, "pak:sky")->info().value();

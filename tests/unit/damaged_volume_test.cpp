@@ -11,6 +11,7 @@
 #include <random>
 
 #include "base/error.hpp"
+#include "support/file_bytes.hpp"
 #include "support/volume_import.hpp"
 #include "volume/inspection.hpp"
 
@@ -20,6 +21,7 @@
 
 namespace {
 
+using cumulet::test::bytes_of;
 using cumulet::test::expect_contract;
 using cumulet::test::rich;
 using cumulet::test::VolumeImport;

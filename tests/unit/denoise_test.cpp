@@ -17,6 +17,7 @@
 #include "gl/state_guard.hpp"
 #include "support/denoise_reference.hpp"
 #include "support/gl_state.hpp"
+#include "support/scrambling_host.hpp"
 #include "support/tza.hpp"
 
 namespace {

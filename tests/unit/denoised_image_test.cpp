@@ -1,107 +1,28 @@
 // Denoised images of a viewer, through the C API.
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "support/c_host.hpp"
+#include "support/denoised_images.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_model.hpp"
 #include "support/tza.hpp"
 
 namespace {
 
-using cumulet::headless::Backend;
-using cumulet::headless::Context;
-using cumulet::test::Folder;
-using cumulet::test::HostTarget;
-using cumulet::test::make_ball;
+using cumulet::test::DenoisedImage;
+using cumulet::test::distance;
+using cumulet::test::floats;
 using cumulet::test::make_desc;
-using cumulet::test::ViewerPtr;
-using cumulet::test::VolumeRef;
-
-constexpr int side = 40;
-constexpr std::size_t floats = std::size_t{side} * side * 4;
-
-// Sum of squared color differences.
-double distance(const std::vector<float>& a, const std::vector<float>& b) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < floats; ++i) sum += i % 4 == 3 ? 0.0 : std::pow(double(a[i]) - double(b[i]), 2.0);
-  return sum;
-}
-
-class DenoisedImage : public testing::Test {
- protected:
-  DenoisedImage() {
-    auto light = make_desc<cumulet_sun_sky_desc>();
-    light.sun_elevation_degrees = 40.0F;
-    std::ranges::fill(light.sun_irradiance, 3.0F);
-    std::ranges::fill(light.sky_radiance, 0.3F);
-    EXPECT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
-    sample(4);
-    write_network(cumulet::test::random_archive(cumulet::test::small_widths, 9));
-  }
-
-  void write_network(const cumulet::denoise::TensorArchive& archive) const {
-    const auto bytes = cumulet::test::tza_file(archive);
-    std::ofstream(file_, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  }
-
-  void sample(std::uint32_t samples, cumulet_view_mode view = CUMULET_VIEW_SHADED,
-              cumulet_preview preview = CUMULET_PREVIEW_OFF) const {
-    auto sampling = make_desc<cumulet_sampling_desc>();
-    sampling.samples = samples;
-    sampling.view = view;
-    sampling.preview = preview;
-    EXPECT_EQ(cumulet_set_sampling(viewer_.get(), &sampling), CUMULET_OK);
-  }
-
-  [[nodiscard]] std::vector<float> picture() const {
-    cumulet::test::picture_of(viewer_.get(), volume_.get(), target_);
-    return linear();
-  }
-
-  [[nodiscard]] std::vector<float> linear() const {
-    std::vector<float> rgba(floats);
-    EXPECT_EQ(cumulet_read_linear(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
-    return rgba;
-  }
-
-  // The displayed (filtered) image, with rows ordered as in the framebuffer.
-  [[nodiscard]] std::vector<std::uint8_t> shown() const {
-    std::vector<std::uint8_t> rgba(floats);
-    EXPECT_EQ(cumulet_read_display(viewer_.get(), rgba.data(), rgba.size()), CUMULET_OK);
-    return cumulet::test::upside_down(rgba, side);
-  }
-  static double off_by(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
-    double off = 0.0;
-    for (std::size_t i = 0; i < floats; ++i) off += std::abs(double(a[i]) - double(b[i])) / double(floats);
-    return off;
-  }
-
-  cumulet_status denoise(const std::string& file, std::vector<float>& rgba) const {
-    auto desc = make_desc<cumulet_denoise_desc>();
-    desc.network = file.c_str();
-    return cumulet_read_denoised(viewer_.get(), &desc, rgba.data(), rgba.size());
-  }
-  [[nodiscard]] std::string error() const { return cumulet_last_error(viewer_.get()); }
-
-  Context context_ = Context::create(Backend::automatic);
-  GladGLContext gl_ = cumulet::test::load_gl(Context::get_proc, &context_);
-  HostTarget target_{gl_, side, side};
-  VolumeRef volume_ = make_ball(24);
-  ViewerPtr viewer_ = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = &context_});
-  Folder folder_;
-  std::string file_ = (folder_ / "network.tza").string();
-};
+using cumulet::test::side;
 
 TEST_F(DenoisedImage, IsDeterministicAndKeepsTheRawImage) {
   const std::vector<float> raw = picture();
@@ -439,169 +360,6 @@ TEST_F(NoiseFreeLight, MediumSoftensShadows) {
 }
 
 // ---- Frames of a camera that moves ----
-
-// Relative squared error of colors.
-double relative_error(const std::vector<float>& values, const std::vector<float>& truth) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double r = truth[i];
-    if (i % 4 != 3) sum += std::pow(values[i] - r, 2.0) / (r * r + 0.01);
-  }
-  return sum / (0.75 * static_cast<double>(values.size()));
-}
-
-std::vector<float> apart(const std::vector<float>& a, const std::vector<float>& b) {
-  std::vector<float> difference;
-  for (std::size_t i = 0; i < a.size(); ++i) difference.push_back(a[i] - b[i]);
-  return difference;
-}
-
-class TemporalDenoising : public DenoisedImage {
- protected:
-  TemporalDenoising() {
-    // A card that is partly inside the cloud.
-    surfaces_ =
-        cumulet::test::make_quad({-4.0F, -9.0F, 3.0F, 13.0F, -9.0F, 3.0F, 13.0F, 2.0F, 6.0F, -4.0F, 2.0F, 6.0F});
-    EXPECT_EQ(cumulet_set_volume(viewer_.get(), volume_.get()), CUMULET_OK);
-    EXPECT_EQ(cumulet_set_surfaces(viewer_.get(), surfaces_.get()), CUMULET_OK);
-  }
-
-  // Temporal history needs previews.
-  void sample(std::uint32_t samples) const {
-    DenoisedImage::sample(samples, CUMULET_VIEW_SHADED, CUMULET_PREVIEW_AUTO);
-  }
-  void look_from(int step) const {
-    const double angle = 0.03 * step;
-    auto stand = make_desc<cumulet_camera_desc>();
-    stand.eye[0] = 34.0 * std::sin(angle);
-    stand.eye[1] = 6.0;
-    stand.eye[2] = 34.0 * std::cos(angle);
-    cumulet_camera* camera = nullptr;
-    ASSERT_EQ(cumulet_get_camera(viewer_.get(), &camera), CUMULET_OK);
-    const cumulet::test::CameraRef owner(camera);
-    ASSERT_EQ(cumulet_camera_set(camera, &stand), CUMULET_OK);
-  }
-  void filter(bool on) const {
-    auto display = make_desc<cumulet_display_desc>();
-    display.denoise = on ? CUMULET_DENOISE_FAST : CUMULET_DENOISE_OFF;
-    ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
-  }
-  // The displayed image once it has all its samples.
-  [[nodiscard]] std::vector<float> frame() const {
-    auto desc = hdr_.frame();
-    desc.color = CUMULET_COLOR_HDR;
-    desc.budget_ms = 1000.0;  // enough for all samples at once, none of them at reduced resolution
-    cumulet::test::converge(viewer_.get(), desc);
-    return hdr_.floats();
-  }
-  // Discards the temporal history.
-  void forget() const {
-    filter(false);
-    auto desc = hdr_.frame();
-    desc.budget_ms = -1.0;
-    ASSERT_EQ(cumulet_render(viewer_.get(), &desc, nullptr), CUMULET_OK);
-    filter(true);
-  }
-  void turn_sun(float azimuth) const {
-    auto light = make_desc<cumulet_sun_sky_desc>();
-    light.sun_elevation_degrees = 40.0F;
-    light.sun_azimuth_degrees = azimuth;
-    std::ranges::fill(light.sun_irradiance, 3.0F);
-    std::ranges::fill(light.sky_radiance, 0.3F);
-    ASSERT_EQ(cumulet_set_sun_sky(viewer_.get(), &light), CUMULET_OK);
-  }
-
-  HostTarget hdr_{gl_, side, side, GL_RGBA32F};
-  cumulet::test::SurfacesRef surfaces_;
-};
-
-// Measured: error with history 0.0075, without 0.0174; flicker 0.205 and 0.498.
-TEST_F(TemporalDenoising, HistoryReducesErrorAndFlicker) {
-  constexpr int frames = 8;
-  std::vector<std::vector<float>> truth;
-  sample(192);
-  for (int i = 0; i < frames; ++i) {
-    look_from(i);
-    truth.push_back(frame());
-  }
-  sample(1);
-  std::array<double, 2> error{};
-  std::array<double, 2> flicker{};
-  const std::vector<float> none(truth[0].size());
-  for (const bool follows : {false, true}) {
-    filter(true);
-    std::vector<float> last;
-    for (int i = 0; i < frames; ++i) {
-      if (!follows || i == 0) forget();
-      look_from(i);
-      const std::vector<float> now = frame();
-      const std::vector<float> off = apart(now, truth[static_cast<std::size_t>(i)]);
-      if (i >= frames / 2) {
-        error.at(follows ? 1 : 0) += relative_error(now, truth[static_cast<std::size_t>(i)]);
-        flicker.at(follows ? 1 : 0) += relative_error(apart(off, last), none);
-      }
-      last = off;
-    }
-  }
-  RecordProperty("error_alone", std::to_string(error[0]));
-  RecordProperty("error_followed", std::to_string(error[1]));
-  RecordProperty("flicker_alone", std::to_string(flicker[0]));
-  RecordProperty("flicker_followed", std::to_string(flicker[1]));
-  EXPECT_LT(error[1], 0.8 * error[0]);
-  EXPECT_LT(flicker[1], 0.8 * flicker[0]);
-}
-
-TEST_F(TemporalDenoising, ChangedLightResetsTheHistory) {
-  sample(2);
-  filter(true);
-  for (int i = 0; i < 4; ++i) {
-    look_from(i);
-    static_cast<void>(frame());
-  }
-  const std::vector<float> before = frame();
-  turn_sun(150.0F);
-  const std::vector<float> after = frame();
-  EXPECT_NE(after, before);
-  forget();
-  EXPECT_EQ(frame(), after);
-}
-
-TEST_F(TemporalDenoising, ReadBackDoesNotDependOnTheHistory) {
-  sample(2);
-  filter(true);
-  const auto read = [this] {
-    const auto desc = make_desc<cumulet_denoise_desc>();
-    std::vector<float> denoised(floats);
-    EXPECT_EQ(cumulet_read_denoised(viewer_.get(), &desc, denoised.data(), denoised.size()), CUMULET_OK) << error();
-    return std::pair(linear(), denoised);
-  };
-  for (int i = 0; i < 4; ++i) {
-    look_from(i);
-    static_cast<void>(frame());
-  }
-  const std::vector<float> shown = frame();
-  const auto moved = read();
-  look_from(1);
-  static_cast<void>(frame());
-  forget();
-  look_from(3);
-  EXPECT_NE(frame(), shown);
-  EXPECT_EQ(read(), moved);
-}
-
-// With enough samples, the history has no weight.
-TEST_F(TemporalDenoising, ImageAtRestDoesNotDependOnTheHistory) {
-  filter(true);
-  sample(1);
-  for (int i = 0; i < 4; ++i) {
-    look_from(i);
-    static_cast<void>(frame());
-  }
-  sample(64);
-  const std::vector<float> rested = frame();
-  forget();
-  EXPECT_EQ(frame(), rested);
-}
 
 TEST_F(DenoisedImage, LinearValuesUseTheDisplayEncoding) {
   const std::vector<float> raw = picture();

@@ -5,23 +5,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "base/error.hpp"
-#include "grid/cell.hpp"
 #include "light/environment_file.hpp"
 #include "light/light_table.hpp"
 #include "scene/raster_source.hpp"
+#include "support/environments.hpp"
 #include "support/folder.hpp"
 #include "support/gl_viewer.hpp"
-#include "support/osmesa_leaks.hpp"
 #include "support/refusal.hpp"
 #include "support/surfaces.hpp"
 #include "support/volumes.hpp"
@@ -60,17 +57,9 @@ using namespace cumulet;
 using glm::dvec3;
 using glm::ivec3;
 using glm::vec3;
-
-constexpr double pi = std::numbers::pi;
-
-light::EnvironmentPtr made(std::uint32_t width, std::uint32_t height,
-                           const std::function<vec3(std::uint32_t, std::uint32_t)>& radiance) {
-  light::EnvironmentPixels pixels{width, height, {}};
-  for (std::uint32_t y = 0; y < height; ++y) {
-    for (std::uint32_t x = 0; x < width; ++x) pixels.values.push_back(radiance(x, y));
-  }
-  return light::make_environment(pixels, "test");
-}
+using test::direction;
+using test::environment_of;
+using test::pi;
 
 core::CpuEnvironment twin(const light::Environment& environment, float degrees = 0.0F) {
   core::CpuEnvironment cpu;
@@ -81,12 +70,8 @@ core::CpuEnvironment twin(const light::Environment& environment, float degrees =
   return cpu;
 }
 
-vec3 direction(double azimuth, double down) {
-  return {std::sin(down) * std::sin(azimuth), std::cos(down), std::sin(down) * std::cos(azimuth)};
-}
-
 TEST(Environment, CenterMapsToZLeftToXAndRotationGoesFromZToX) {
-  const auto environment = made(64, 32, [](std::uint32_t x, std::uint32_t y) {
+  const auto environment = environment_of(64, 32, [](std::uint32_t x, std::uint32_t y) {
     return vec3(x == 16 ? 1.0F : 0.0F, y < 8 ? 1.0F : 0.0F, x == 32 ? 1.0F : 0.0F);
   });
   const auto at = [&](const vec3& w, float degrees) {
@@ -105,7 +90,7 @@ TEST(Environment, CenterMapsToZLeftToXAndRotationGoesFromZToX) {
 light::EnvironmentPtr uneven() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
-  return made(48, 24, [&](std::uint32_t, std::uint32_t) {
+  return environment_of(48, 24, [&](std::uint32_t, std::uint32_t) {
     const float u = unit(random);
     return u < 0.3F ? vec3(0.0F) : vec3(u, u * u, unit(random)) * (u > 0.99F ? 3000.0F : 1.0F);
   });
@@ -188,35 +173,37 @@ vec3 two_colors(std::uint32_t x, std::uint32_t y) {
 }
 
 TEST(Environment, SphericalHarmonicsMatchIrradiance) {
-  expect_irradiance(*made(128, 64, [](auto, auto) { return vec3(0.3F, 2.0F, 7.0F); }), 1e-3);
-  expect_irradiance(*made(128, 64, two_colors), 0.01);
+  expect_irradiance(*environment_of(128, 64, [](auto, auto) { return vec3(0.3F, 2.0F, 7.0F); }), 1e-3);
+  expect_irradiance(*environment_of(128, 64, two_colors), 0.01);
   // A smooth function of all orders up to the second: exact except for the texels.
-  const auto smooth = made(128, 64, [](std::uint32_t x, std::uint32_t y) {
+  const auto smooth = environment_of(128, 64, [](std::uint32_t x, std::uint32_t y) {
     const vec3 w = direction(2.0 * pi * (0.5 - (x + 0.5) / 128.0), pi * (y + 0.5) / 64.0);
     return vec3(2.0F + w.x - 0.5F * w.y, 1.5F + w.x * w.z + w.z, 2.0F + w.y * w.y - w.x * w.x + w.y * w.z + w.x * w.y);
   });
   expect_irradiance(*smooth, 2e-3);
   // The worst case: light from a single direction. At its peak the irradiance is 4 times its mean.
-  expect_irradiance(*made(128, 64, [](auto x, auto y) { return vec3(x == 20 && y == 25 ? 5000.0F : 0.0F); }), 0.35);
+  expect_irradiance(*environment_of(128, 64, [](auto x, auto y) { return vec3(x == 20 && y == 25 ? 5000.0F : 0.0F); }),
+                    0.35);
 }
 
 TEST(Environment, NonFinitePixelsCountAsZeroAndAreReported) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  const auto environment = made(2, 2, [&](std::uint32_t x, std::uint32_t y) {
+  const auto environment = environment_of(2, 2, [&](std::uint32_t x, std::uint32_t y) {
     if (y == 0) return x == 0 ? vec3(nan, 1.0F, 1.0F) : vec3(1.0F, -1.0F, 1.0F);
     return x == 0 ? vec3(std::numeric_limits<float>::infinity()) : vec3(1.0F);
   });
   EXPECT_EQ(environment->replaced, 3U);
   EXPECT_NEAR(environment->mean.x, 0.5, 1e-6);
   EXPECT_NEAR(environment->mean.y, 0.5, 1e-6);
-  const auto dark = made(4, 2, [](std::uint32_t, std::uint32_t) { return vec3(0.0F); });
+  const auto dark = environment_of(4, 2, [](std::uint32_t, std::uint32_t) { return vec3(0.0F); });
   EXPECT_EQ(dark->density, 0.0F);
   EXPECT_EQ(light::LightTable({}, {dark}, {}, {}).parameters().any, 0U);
 }
 
 TEST(Environment, PreservesRadianceOfAnyMagnitude) {
   for (const float value : {1e30F, 72704.0F, 1.0F, 0.3F, 1e-12F, 1e-38F}) {
-    const auto environment = made(1, 1, [&](std::uint32_t, std::uint32_t) { return vec3(value, 0.5F * value, 0.0F); });
+    const auto environment =
+        environment_of(1, 1, [&](std::uint32_t, std::uint32_t) { return vec3(value, 0.5F * value, 0.0F); });
     core::CpuEnvironment cpu = twin(*environment);
     const vec3 kept = cpu.cm_environment_texel(0);
     EXPECT_NEAR(kept.x / value, 1.0F, 6e-4F) << value;
@@ -226,7 +213,8 @@ TEST(Environment, PreservesRadianceOfAnyMagnitude) {
 }
 
 TEST(Environment, DownsampledPixelsAreMeans) {
-  const auto environment = made(8, 4, [](std::uint32_t x, std::uint32_t y) { return vec3(float(x), float(y), 1.0F); });
+  const auto environment =
+      environment_of(8, 4, [](std::uint32_t x, std::uint32_t y) { return vec3(float(x), float(y), 1.0F); });
   const std::vector<vec3> half = light::pixels_of(*environment, 4, 2);
   ASSERT_EQ(half.size(), 8U);
   for (std::uint32_t i = 0; i < 8; ++i) {
@@ -237,88 +225,6 @@ TEST(Environment, DownsampledPixelsAreMeans) {
   const std::vector<vec3> larger = light::pixels_of(*environment, 16, 5);
   EXPECT_EQ(larger.at(0), vec3(0.0F, 0.0F, 1.0F));
   EXPECT_EQ(larger.at(16 * 5 - 1), vec3(7.0F, 3.0F, 1.0F));
-}
-
-// Prefiltered value of a texel, with the mean added.
-double prefiltered_at(const light::Environment& environment, int level, int x, int y) {
-  const auto i = std::size_t(level * core::CM_PREFILTERED_HEIGHT + y) * core::CM_PREFILTERED_WIDTH + std::size_t(x);
-  return environment.mean.y + environment.prefiltered->at(i).y;
-}
-
-// Near the poles a texel's solid angle varies strongly inside its row.
-TEST(PrefilteredEnvironment, SmallLightNearAPoleIsWeightedBySolidAngle) {
-  constexpr std::uint32_t columns = 512;
-  constexpr std::uint32_t rows = 256;
-  constexpr std::uint32_t column = 100;
-  for (const std::uint32_t row : {2U, 14U, rows - 1 - 2U}) {  // 1.8 and 10 degrees from a pole
-    const auto environment = made(
-        columns, rows, [&](std::uint32_t x, std::uint32_t y) { return vec3(x == column && y == row ? 1e4F : 0.0F); });
-    ASSERT_NE(environment->prefiltered, nullptr);
-    const auto lobe = [](double cosine) {
-      if (cosine <= 0.0) return 0.0;
-      const double half = std::sqrt(0.5 - 0.5 * cosine);
-      return double(core::cm_ggx(core::cm_alpha(1.0F), vec3(0.0F, 0.0F, 1.0F),
-                                 vec3(std::sqrt(1.0 - cosine * cosine), 0.0F, cosine),
-                                 vec3(half, 0.0F, std::sqrt(1.0 - half * half))));
-    };
-    for (const int x : {0, 17, 40}) {
-      for (int up = 0; up < 8; ++up) {
-        const int y = row < rows / 2 ? up : core::CM_PREFILTERED_HEIGHT - 1 - up;
-        const vec3 middle = direction(2.0 * pi * (0.5 - (x + 0.5) / core::CM_PREFILTERED_WIDTH),
-                                      pi * (y + 0.5) / core::CM_PREFILTERED_HEIGHT);
-        double light = 0.0;
-        double all = 0.0;
-        for (std::uint32_t i = 0; i < columns * rows; ++i) {
-          const double down = pi * (std::floor(double(i) / columns) + 0.5) / rows;
-          const vec3 w = direction(2.0 * pi * (0.5 - (i % columns + 0.5) / columns), down);
-          const double weight = std::sin(down) * lobe(glm::dot(w, middle));
-          all += weight;
-          if (i == row * columns + column) light = 1e4 * weight;
-        }
-        const double expected = light / all;
-        EXPECT_NEAR(prefiltered_at(*environment, core::CM_PREFILTERED_LEVELS - 1, x, y), expected, 0.03 * expected)
-            << row << ' ' << x << ' ' << y;
-      }
-    }
-  }
-}
-
-// Weighted by the solid angle of the cells, for images of any size.
-TEST(PrefilteredEnvironment, SharpestLevelKeepsTheMeanRadiance) {
-  for (const auto& [columns, rows] : {std::pair(100U, 37U), std::pair(256U, 128U), std::pair(5U, 3U)}) {
-    std::mt19937 random(3);
-    const auto environment = made(columns, rows, [&](auto, auto) { return vec3(float(random() % 1000)); });
-    double mean = 0.0;
-    for (int y = 0; y < core::CM_PREFILTERED_HEIGHT; ++y) {
-      const double edge = pi / core::CM_PREFILTERED_HEIGHT;
-      const double area = (std::cos(edge * y) - std::cos(edge * (y + 1))) / (2.0 * core::CM_PREFILTERED_WIDTH);
-      for (int x = 0; x < core::CM_PREFILTERED_WIDTH; ++x) mean += area * prefiltered_at(*environment, 0, x, y);
-    }
-    EXPECT_NEAR(mean / environment->mean.y, 1.0, 1e-5) << columns;
-  }
-}
-
-TEST(PrefilteredEnvironment, IsNotBuiltForUniformOrBlackSkies) {
-  for (const float value : {0.0F, 0.3F, 1e30F})
-    EXPECT_EQ(made(100, 37, [&](auto, auto) { return vec3(value, 0.5F * value, 0.0F); })->prefiltered, nullptr)
-        << value;
-  EXPECT_NE(made(100, 37, [](auto x, auto) { return vec3(x == 3 ? 0.301F : 0.3F); })->prefiltered, nullptr);
-}
-
-TEST(PrefilteredEnvironment, CanBeCancelledBetweenRows) {
-  Progress progress;
-  std::atomic<int> rows = 0;
-  const auto read = [&](std::uint32_t, std::vector<vec3>& row) {
-    std::ranges::fill(row, vec3(1.0F));
-    if (++rows == 100) progress.cancel();
-  };
-  EXPECT_THROW(light::prefilter({64, 16384, read}, dvec3(0.5), &progress), Error);
-  EXPECT_LT(rows, 16384 / 2);
-  rows = 0;
-  Progress whole;
-  const auto steps = [&](std::uint32_t y, std::vector<vec3>& row) { std::ranges::fill(row, vec3(float(y % 2))); };
-  EXPECT_NE(light::prefilter({64, 48, steps}, dvec3(0.5), &whole), nullptr);
-  EXPECT_DOUBLE_EQ(whole.fraction(), 1.0);
 }
 
 std::string refusal_of(const light::EnvironmentPixels& pixels) {
@@ -422,6 +328,7 @@ class EnvironmentLighting : public test::ViewerTest {
     return still;
   }
 };
+
 CUMULET_ON_BACKENDS(EnvironmentLighting);
 
 TEST_P(EnvironmentLighting, UniformEnvironmentEqualsUniformSky) {
@@ -430,7 +337,7 @@ TEST_P(EnvironmentLighting, UniformEnvironmentEqualsUniformSky) {
   still->set_light({30.0F, 20.0F, vec3(0.5F), color});
   const Seen sky = see(*still, 32);
   still->set_light({30.0F, 20.0F, vec3(0.5F), vec3(7.0F)});  // hidden by the environment
-  still->viewer().set_environment(made(16, 8, [&](std::uint32_t, std::uint32_t) { return 0.5F * color; }));
+  still->viewer().set_environment(environment_of(16, 8, [&](std::uint32_t, std::uint32_t) { return 0.5F * color; }));
   still->viewer().set_environment_settings({40.0F, 2.0F});
   expect_same(see(*still, 32), sky, 1e-3);
   still->viewer().set_environment(nullptr);
@@ -441,7 +348,7 @@ TEST_P(EnvironmentLighting, UniformEnvironmentEqualsUniformSky) {
 TEST_P(EnvironmentLighting, WhiteFurnaceHasOneColor) {
   const auto still = ball(0.0F, vec3(1.0F));
   still->set_light({});
-  still->viewer().set_environment(made(8, 4, [](std::uint32_t, std::uint32_t) { return vec3(1.0F); }));
+  still->viewer().set_environment(environment_of(8, 4, [](std::uint32_t, std::uint32_t) { return vec3(1.0F); }));
   const Seen seen = see(*still, 64);
   EXPECT_NEAR(seen.mean.x, 1.0, 4.0 * seen.error.x + 1e-4);
   EXPECT_LT(seen.error.x, 2e-3);
@@ -456,7 +363,7 @@ TEST_P(EnvironmentLighting, RasterizedSpheresMatchPathTracedOnes) {
   camera.orthographic_height = 10.0;
   still->set_camera(camera);
   still->set_light({});
-  still->viewer().set_environment(made(128, 64, two_colors));
+  still->viewer().set_environment(environment_of(128, 64, two_colors));
   still->viewer().set_environment_settings({30.0F, 1.5F});
   struct Kind {
     surface::Material material;
@@ -519,9 +426,10 @@ TEST_P(EnvironmentLighting, RasterizedReflectionsUseTheCurrentEnvironment) {
     still.viewer().set_environment(environment);
     return test::render(still, {24, 24, 4, 1});
   };
-  const light::EnvironmentPtr halves = made(128, 64, two_colors);
-  const light::EnvironmentPtr turned = made(128, 64, [](auto x, auto y) { return two_colors(127 - x, 63 - y); });
-  const light::EnvironmentPtr even = made(8, 4, [](auto, auto) { return vec3(0.5F); });
+  const light::EnvironmentPtr halves = environment_of(128, 64, two_colors);
+  const light::EnvironmentPtr turned =
+      environment_of(128, 64, [](auto x, auto y) { return two_colors(127 - x, 63 - y); });
+  const light::EnvironmentPtr even = environment_of(8, 4, [](auto, auto) { return vec3(0.5F); });
   const auto still = glossy();
   std::vector<test::Picture> pictures;
   for (const light::EnvironmentPtr& environment :
@@ -549,7 +457,7 @@ TEST_P(EnvironmentLighting, BrightTexelLightsLikeASun) {
                     vec3(3.0F), vec3(0.0F)});
   const Seen sun = see(*still, 64);
   still->set_light({});
-  still->viewer().set_environment(made(width, height, [&](std::uint32_t x, std::uint32_t y) {
+  still->viewer().set_environment(environment_of(width, height, [&](std::uint32_t x, std::uint32_t y) {
     return x == column && y == row ? vec3(static_cast<float>(3.0 / solid_angle)) : vec3(0.0F);
   }));
   const Seen texel = see(*still, 64);
@@ -566,7 +474,7 @@ vec3 patch(std::uint32_t x, std::uint32_t y) {
 // Compares NEE with MIS, NEE with lower probability, and scattered rays only. Media with one and with many scattering
 // events, and a matte ground plane.
 TEST_P(EnvironmentLighting, NextEventEstimationAgreesWithScatteredRaysOnly) {
-  const light::EnvironmentPtr environment = made(128, 64, patch);
+  const light::EnvironmentPtr environment = environment_of(128, 64, patch);
   const volume::ScalarVolume volume = test::make_volume(ivec3(20), ivec3(0), [](const ivec3&) { return 1.0F; });
   struct Case {
     const char* name;
@@ -629,7 +537,7 @@ TEST_P(EnvironmentLighting, NextEventEstimationAgreesWithScatteredRaysOnly) {
 // A sun as in spiaggia_di_mondello_1k.hdr: 72,704 in one or two texels of a sky of 0.5. A pixel's differences between
 // seeds must be in the range of its neighbors' noise, without single outliers.
 TEST_P(EnvironmentLighting, SunInAnEnvironmentMapGivesNoFireflies) {
-  const light::EnvironmentPtr environment = made(1024, 512, [](std::uint32_t x, std::uint32_t y) {
+  const light::EnvironmentPtr environment = environment_of(1024, 512, [](std::uint32_t x, std::uint32_t y) {
     if (x == 300 && (y == 120 || y == 121)) return vec3(72704.0F, 68000.0F, 60000.0F);
     return y < 256 ? vec3(0.4F, 0.5F, 0.7F) : vec3(0.2F, 0.18F, 0.15F);
   });

@@ -17,6 +17,7 @@
 #include <random>
 #include <vector>
 
+#include "support/file_bytes.hpp"
 #include "support/folder.hpp"
 #include "support/vdb_files.hpp"
 #include "volume/frame_import.hpp"
@@ -159,8 +160,7 @@ class FileVersions : public ::testing::Test {
   [[nodiscard]] std::string vdb(const openvdb::GridPtrVec& grids) const {
     const fs::path file = folder_ / "written.vdb";
     openvdb::io::File(file.string()).write(grids);
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
+    return cumulet::test::bytes_of(file);
   }
   static std::string refusal(const fs::path& file) {
     return cumulet::test::refusal(file, [&] { (void)import_volume(file, "", {}); });
@@ -420,8 +420,7 @@ TEST_F(FileVersions, VdbHalfFloatGridsAreRead) {
       out.setCompression(flags);
       out.write({other, grid});
       out.close();
-      std::ifstream stream(file, std::ios::binary);
-      std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+      std::string bytes = cumulet::test::bytes_of(file);
       patch(bytes, 225);
       const fs::path later = write(bytes, "later.vdb");
       const auto listed = list_grids(later);

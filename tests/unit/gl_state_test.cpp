@@ -14,6 +14,7 @@
 #include "render/compositor.hpp"
 #include "render/host_depth.hpp"
 #include "support/gl_state.hpp"
+#include "support/scrambling_host.hpp"
 
 namespace {
 

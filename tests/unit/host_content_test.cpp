@@ -10,11 +10,11 @@
 
 #include <array>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "support/c_host.hpp"
+#include "support/file_bytes.hpp"
 #include "support/folder.hpp"
 #include "support/openvdb.hpp"
 #include "support/volumes.hpp"
@@ -24,13 +24,9 @@ namespace {
 
 using namespace cumulet;
 using openvdb::Coord;
+using test::bytes_of;
 using test::make_desc;
 using test::VolumeRef;
-
-std::string content_of(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 /// A pak file: the content lies between other bytes.
 struct Pak {
@@ -120,7 +116,7 @@ class HostVolume : public testing::Test {
 TEST_F(HostVolume, BytesAndStreamsEqualFiles) {
   for (const std::string& file : {vdb_, nvdb_}) {
     const VolumeRef whole = open(file);
-    const std::string content = content_of(file);
+    const std::string content = bytes_of(file);
     const Answer memory = from_memory(content);
     ASSERT_EQ(memory.status, CUMULET_OK) << memory.line;
     test::expect_identical(memory.volume->asset->volume(), whole->asset->volume());
@@ -134,7 +130,7 @@ TEST_F(HostVolume, BytesAndStreamsEqualFiles) {
 TEST_F(HostVolume, DescriptorsChooseGridsAndTransform) {
   cumulet_volume_file_desc desc = named("pak:cloud", "other");
   for (int i = 0; i < 4; ++i) desc.to_world[5 * i] = i < 3 ? 2.0 : 1.0;
-  Pak pak(content_of(vdb_));
+  Pak pak(bytes_of(vdb_));
   const Answer stream = from_stream(pak, &desc);
   ASSERT_EQ(stream.status, CUMULET_OK) << stream.line;
   EXPECT_EQ(stream.volume->asset->volume().name, "other");
@@ -143,7 +139,7 @@ TEST_F(HostVolume, DescriptorsChooseGridsAndTransform) {
 
 TEST_F(HostVolume, BadContentIsOneLineWithTheHostsName) {
   const cumulet_volume_file_desc desc = named("pak:cloud");
-  const std::string content = content_of(vdb_);
+  const std::string content = bytes_of(vdb_);
   const auto expect = [](const Answer& answer, const std::string& line) {
     EXPECT_EQ(answer.status, CUMULET_ERROR_FILE);
     EXPECT_EQ(answer.volume, nullptr);
@@ -158,7 +154,7 @@ TEST_F(HostVolume, BadContentIsOneLineWithTheHostsName) {
   Pak empty("");
   expect(from_stream(empty), "stream: is empty");
   for (const std::string& file : {vdb_, nvdb_}) {
-    Pak pak(content_of(file));
+    Pak pak(bytes_of(file));
     pak.fails_from = pak.size / 2;
     const Answer failed = from_stream(pak, &desc);
     EXPECT_EQ(failed.status, CUMULET_ERROR_FILE);

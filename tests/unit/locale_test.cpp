@@ -6,7 +6,6 @@
 #include <clocale>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <locale>
 #include <map>
 #include <sstream>
@@ -21,6 +20,7 @@
 #include "memory.hpp"
 #include "options.hpp"
 #include "scene_file.hpp"
+#include "support/file_bytes.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_import.hpp"
 #include "support/vdb_files.hpp"
@@ -33,6 +33,7 @@
 namespace {
 
 using namespace cumulet;
+using test::bytes_of;
 namespace fs = std::filesystem;
 
 /// Formats 1234567.5 as 1.234.567,5.
@@ -72,11 +73,6 @@ class HostileLocales {
   std::string c_;
   bool has_comma_ = false;
 };
-
-std::string bytes_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 template <class Call>
 std::string error_of(Call&& call) {

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "support/counted_host.hpp"
+#include "support/file_bytes.hpp"
 #include "support/folder.hpp"
 #include "support/openvdb.hpp"
 #include "support/osmesa_leaks.hpp"
@@ -159,8 +160,7 @@ class FileErrors : public testing::Test {
     openvdb::io::File file(path("good.vdb"));
     file.write({grid});
     file.close();
-    std::ifstream whole(path("good.vdb"), std::ios::binary);
-    std::string bytes((std::istreambuf_iterator<char>(whole)), {});
+    const std::string bytes = cumulet::test::bytes_of(path("good.vdb"));
     std::ofstream(path("cut.vdb"), std::ios::binary) << bytes.substr(0, bytes.size() / 2);
     std::ofstream(path("empty.vdb"), std::ios::binary) << "";
     std::ofstream(path("noise.nvdb"), std::ios::binary) << std::string(5000, 'x');

@@ -8,11 +8,11 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <sstream>
 
 #include "stage_scripts/scripts.hpp"
+#include "support/file_bytes.hpp"
 
 namespace {
 
@@ -31,11 +31,6 @@ std::vector<StageScript> all_scripts() {
 
 std::filesystem::path file_of(const std::string& name) {
   return std::filesystem::path(CUMULET_STAGE_RECORDS) / (name + ".txt");
-}
-
-std::string read(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 // The first line that differs, with the step that it belongs to; "" if the texts are equal.
@@ -77,7 +72,7 @@ TEST_P(StageRecord, IsTheSame) {
   const char* bless = std::getenv("CUMULET_BLESS");
   if (bless == nullptr || std::string(bless) != "1") {
     ASSERT_TRUE(std::filesystem::exists(path)) << path << ": CUMULET_BLESS=1 writes it";
-    const std::string expected = read(path);
+    const std::string expected = cumulet::test::bytes_of(path);
     std::string differs = difference(expected, first.text);
     // Rarely, a short job ends within the frame that requests it. Other decisions differ each time.
     for (int i = 0; i < 3 && !differs.empty(); ++i) differs = difference(expected, record(GetParam()).text);

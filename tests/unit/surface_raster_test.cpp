@@ -20,6 +20,7 @@
 #include "gl/state_guard.hpp"
 #include "render/progressive.hpp"
 #include "support/gl_state.hpp"
+#include "support/scrambling_host.hpp"
 #include "support/surface_rasters.hpp"
 #include "support/surfaces.hpp"
 

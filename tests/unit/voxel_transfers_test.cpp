@@ -13,6 +13,7 @@
 #include "support/gl_state.hpp"
 #include "support/live_gl_states.hpp"
 #include "support/live_volumes.hpp"
+#include "support/scrambling_host.hpp"
 #include "support/simulated.hpp"
 
 namespace {

@@ -15,14 +15,9 @@ namespace {
 using glm::dvec3;
 
 viewer::GridSettings for_views() {
-  viewer::GridSettings settings;
+  viewer::GridSettings settings = adaptive_grid();
   settings.build.refine.threshold = 0.1;
-  settings.camera_adaptive = true;
   return settings;
-}
-
-void set_grid(StageRecorder& r, const std::string& name, const viewer::GridSettings& settings) {
-  r.call(name, [&] { r.viewer().set_grid(settings); });
 }
 
 void set_volume(StageRecorder& r, const viewer::VolumeAssetPtr& volume) {

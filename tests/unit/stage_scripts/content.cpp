@@ -79,6 +79,12 @@ viewer::GridSettings limited_grid() {
   return settings;
 }
 
+viewer::GridSettings adaptive_grid() {
+  viewer::GridSettings settings;
+  settings.camera_adaptive = true;
+  return settings;
+}
+
 viewer::GridSettings fine_grid() {
   viewer::GridSettings settings;
   settings.build.refine.threshold = -1.0;

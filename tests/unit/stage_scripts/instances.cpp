@@ -8,27 +8,9 @@ namespace cumulet::test {
 
 namespace {
 
-using InstancePtr = std::shared_ptr<viewer::Instance>;
-
 InstancePtr instance_of(viewer::VolumeAssetPtr volume, const glm::dmat4& to_world = glm::dmat4(1.0)) {
   return std::make_shared<viewer::Instance>(
       viewer::InstanceSettings{.volume = std::move(volume), .to_world = to_world});
-}
-
-void add(StageRecorder& r, const std::string& name, const InstancePtr& instance) {
-  r.call("add " + name, [&] { r.viewer().add_instance(instance); });
-}
-
-void remove(StageRecorder& r, const std::string& name, const InstancePtr& instance) {
-  r.call("remove " + name, [&] { r.viewer().remove_instance(*instance); });
-}
-
-// Changes the settings of an instance, waits and writes a frame.
-void edit(StageRecorder& r, const std::string& name, const InstancePtr& instance,
-          const std::function<void(viewer::InstanceSettings&)>& change) {
-  r.call(name, [&] { instance->edit(change); });
-  r.wait();
-  r.frame();
 }
 
 // ---- instances ----

@@ -2,6 +2,8 @@
 
 // Scripts of stage_record_test, and their volumes, files and surfaces.
 
+#include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <memory>
 #include <ostream>
@@ -21,6 +23,9 @@ struct StageScript {
 
 inline void PrintTo(const StageScript& script, std::ostream* out) { *out << script.name; }
 
+using InstancePtr = std::shared_ptr<viewer::Instance>;
+using SequencePtr = std::shared_ptr<viewer::Sequence>;
+
 std::vector<StageScript> volume_scripts();
 std::vector<StageScript> instance_scripts();
 std::vector<StageScript> limit_scripts();
@@ -30,6 +35,20 @@ std::vector<StageScript> surface_scripts();
 std::vector<StageScript> light_scripts();
 std::vector<StageScript> camera_scripts();
 std::vector<StageScript> error_scripts();
+
+// ---- steps ----
+
+void set_grid(StageRecorder& r, const std::string& name, const viewer::GridSettings& settings);
+void add(StageRecorder& r, const std::string& name, const InstancePtr& instance);
+void remove(StageRecorder& r, const std::string& name, const InstancePtr& instance);
+/// Changes the settings of an instance, waits and writes a frame.
+void edit(StageRecorder& r, const std::string& name, const InstancePtr& instance,
+          const std::function<void(viewer::InstanceSettings&)>& change);
+/// Frames that are read from these files.
+SequencePtr sequence_of(const std::vector<std::string>& paths, std::uint64_t memory_bytes = std::uint64_t{1} << 32U,
+                        bool suggested = false);
+void set_sequence(StageRecorder& r, const SequencePtr& sequence);
+void simulate_display(StageRecorder& r, bool displays);
 
 // ---- messages at which jobs can be held ----
 
@@ -56,6 +75,8 @@ viewer::Medium medium_of(double density_scale);
 viewer::GridSettings limited_grid();
 /// A grid of all voxels that differ.
 viewer::GridSettings fine_grid();
+/// A grid that is refined for the views.
+viewer::GridSettings adaptive_grid();
 
 glm::dmat4 moved(double x, double y = 0.0, double z = 0.0);
 glm::dmat4 scaled(double factor);

@@ -137,10 +137,6 @@ class VolumeImport : public ::testing::Test {
     std::ofstream(path(name), std::ios::binary) << bytes;
     return path(name);
   }
-  static std::string bytes_of(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
 
   static std::string refusal(const std::filesystem::path& file, const std::string& grid = {}) {
     return test::refusal(file, [&] { (void)volume::import_volume(file, grid, {}); });
