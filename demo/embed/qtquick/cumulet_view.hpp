@@ -31,13 +31,13 @@ class SharedViewer final : public QObject {
 /// All calls of the viewer are made by the thread that renders, which has the GL context. The item keeps input and
 /// settings until synchronize(), during which Qt blocks the item's thread.
 class CumuletView : public QQuickFramebufferObject {
-  Q_OBJECT
-  QML_ELEMENT
   Q_PROPERTY(QUrl source READ source WRITE set_source NOTIFY source_changed)
   Q_PROPERTY(int samples READ samples WRITE set_samples NOTIFY samples_changed)
   Q_PROPERTY(double exposure READ exposure WRITE set_exposure NOTIFY exposure_changed)
   Q_PROPERTY(double progress READ progress NOTIFY frame_done)
-  Q_PROPERTY(bool converged READ converged NOTIFY frame_done);  // ends the list for parsers that do not know Qt
+  Q_PROPERTY(bool converged READ converged NOTIFY frame_done)
+  Q_OBJECT
+  QML_ELEMENT
 
  public:
   explicit CumuletView(QQuickItem* parent = nullptr);
