@@ -11,13 +11,13 @@ import c_header
 
 DESCRIPTORS = ["grid", "medium", "sun_sky", "light", "environment_settings", "ground", "surface_settings", "sampling",
                "display", "camera", "navigation", "frame", "transmittance_map", "volume_file", "denoise", "playback",
-               "dynamic_volume", "limits"]
+               "dynamic_volume", "limits", "read"]
 # Descriptors that C functions also fill.
 FILLED = {"camera"}
 # Structs that only C functions fill.
 TOLD = ["volume_info", "histogram_info", "volume_file_info", "grid_info", "metadata", "surfaces_info", "animation_info",
         "variant_info", "environment_info", "progress", "warm_up_result", "pick", "transmittance_map", "sequence_info",
-        "dynamic_volume_info", "stats"]
+        "dynamic_volume_info", "stats", "read_info"]
 COUNTED = {"default_grid"}  # int32_t members that are numbers or -1, not booleans
 ENUMS_BY_HAND = {"cumulet_status", "cumulet_key"}
 RENAMED = {"auto": "automatic"}  # a C++ keyword

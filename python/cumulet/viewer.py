@@ -42,22 +42,44 @@ def _address(function: Any) -> Any:
     return (lambda name: int(function(name) or 0)) if callable(function) else function
 
 
-def _destroy(pointer: Any, lock: Any, context: Any, callbacks: Any) -> None:
-    """Destroys a viewer after the running call of another thread, then its context. The callbacks live until then."""
+class _Calls:
+    """Counts the running calls of a viewer."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._running = 0
+
+    def begin(self, viewer: Viewer) -> Any:
+        """Returns the viewer's pointer, which stays valid until end()."""
+        with self._changed:
+            pointer = viewer._pointer
+            self._running += 1
+            return pointer
+
+    def end(self) -> None:
+        with self._changed:
+            self._running -= 1
+            self._changed.notify_all()
+
+    def wait(self, seconds: float) -> bool:
+        """Waits until no call is running. Returns False if the time ran out."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._running == 0, seconds)
+
+
+def _destroy(pointer: Any, calls: _Calls, context: Any, callbacks: Any) -> None:
+    """Destroys a viewer after the running calls of other threads, then its context. The callbacks live until then."""
     api.cumulet_cancel(pointer)
-    if not lock.acquire(timeout=_support.EXIT_SECONDS):
+    if not calls.wait(_support.EXIT_SECONDS):
         return  # a thread still uses it
-    try:
-        if context is not None and not context.closed:
-            try:
-                context.make_current()
-            except Error:
-                pass  # its GL objects end with the context
-        api.cumulet_destroy(pointer)
-        if context is not None:
-            context.close()
-    finally:
-        lock.release()
+    if context is not None and not context.closed:
+        try:
+            context.make_current()
+        except Error:
+            pass  # its GL objects end with the context
+    api.cumulet_destroy(pointer)
+    if context is not None:
+        context.close()
     del callbacks
 
 
@@ -78,9 +100,8 @@ class Viewer(_methods.ViewerMethods):
                  trace: Callable[[str, float, float], Any] | None = None, gl_state: api.GlStatePolicy | str | None = None,
                  shader_cache: objects.ShaderCache | None = None) -> None:
         _support.destroy_postponed()
-        self._lock = threading.RLock()  # held during calls, except those at any time, which are counted
-        self._idle = threading.Condition()
-        self._running = 0
+        self._gl_lock = threading.RLock()  # held during calls that use the context
+        self._running = _Calls()
         self._size = (0, 0)  # height and width of the displayed image
         self.context = context
         desc = _support.fill(api.cumulet_create_desc, {
@@ -115,42 +136,40 @@ class Viewer(_methods.ViewerMethods):
             context.close()
             raise
 
-    # Calls. One at a time, except those that may come from any thread at any time.
+    # Calls. Threads wait for each other only if both use the context.
 
     def _call(self, function: Any, *arguments: Any) -> Any:
         _support.refuse_in_callback(function)
-        with self._lock:
-            pointer = self._pointer
+        pointer = self._running.begin(self)
+        try:
             result = _support.checked_types(function, (pointer, *arguments))
             if function.restype is ctypes.c_int and result != 0:
                 line = api.cumulet_last_error(pointer).decode("utf-8", "replace")
                 raise Error(line or api.cumulet_status_text(result).decode("utf-8"), result)
             return result
+        finally:
+            self._running.end()
 
     def _call_gl(self, function: Any, *arguments: Any) -> Any:
-        if self.context is not None and not _support.in_callback():
-            self.context.make_current()
-        result = self._call(function, *arguments)
-        if function is api.cumulet_render:
-            shown = arguments[1]._obj
-            self._size = (shown.height, shown.width)
-        return result
+        _support.refuse_in_callback(function)
+        with self._gl_lock:
+            if self.context is not None:
+                self.context.make_current()
+            result = self._call(function, *arguments)
+            if function is api.cumulet_render:
+                shown = arguments[1]._obj
+                self._size = (shown.height, shown.width)
+            return result
 
     def _call_any_time(self, function: Any, *arguments: Any) -> Any:
-        with self._idle:
-            pointer = self._pointer
-            self._running += 1
+        pointer = self._running.begin(self)
         try:
             return function(pointer, *arguments)
         finally:
-            with self._idle:
-                self._running -= 1
-                self._idle.notify_all()
+            self._running.end()
 
     def _release(self, out: Any) -> None:
-        with self._idle:
-            self._idle.wait_for(lambda: self._running == 0)
-        destroy = functools.partial(_destroy, out, self._lock, self.context, self._callbacks)
+        destroy = functools.partial(_destroy, out, self._running, self.context, self._callbacks)
         if _support.in_callback():  # where cumulet_destroy does nothing
             _support._postponed.append(destroy)
         else:
@@ -228,6 +247,20 @@ class Viewer(_methods.ViewerMethods):
             "values": array.view, "size": array.shape[0], "shaper": shaper, "domain_min": domain[0],
             "domain_max": domain[1]})
         self._call(api.cumulet_set_display_lut, ctypes.byref(desc))
+
+    def finish_read(self, read: int) -> memoryview | None:
+        """Returns the values of a read, float32 (height, width, channels), or None if it is not ready. Does not wait.
+
+        read: The number that begin_read returned. The call that returns values ends the read.
+        C: cumulet_finish_read.
+        """
+        info = api.cumulet_read_info()
+        self._call_gl(api.cumulet_finish_read, read, None, 0, ctypes.byref(info))
+        if not info.ready:
+            return None
+        memory, view = _support.new_array(ctypes.c_float, info.height, info.width, info.channels)
+        self._call_gl(api.cumulet_finish_read, read, memory, len(memory), ctypes.byref(info))
+        return view
 
     def read_display(self) -> memoryview:
         """Reads the image as it is displayed, uint8 (height, width, 4), straight alpha. C: cumulet_read_display."""

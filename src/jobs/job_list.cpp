@@ -36,9 +36,12 @@ void JobList::set_job_log(JobLog* log) {
 }
 
 bool JobList::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
-  // Without the lock, so that other threads can call status() and cancel().
-  return std::ranges::all_of(own_, [&](const Own& own) { return own.source->wait(until); }) &&
-         std::ranges::all_of(players_, [&](const auto& player) { return player->wait(until); });
+  if (!std::ranges::all_of(own_, [&](const Own& own) { return own.source->wait(until); })) return false;
+  // Without the lock, so that other threads can make calls.
+  std::unique_lock lock(mutex_);
+  const std::vector<std::shared_ptr<JobSource>> players = players_;
+  lock.unlock();
+  return std::ranges::all_of(players, [&](const auto& player) { return player->wait(until); });
 }
 
 bool JobList::busy() const {

@@ -13,8 +13,8 @@
 namespace cumulet::viewer {
 
 /// All sources of jobs of a viewer: its own, in the order in which they were added, then players. A player follows a
-/// sequence or a dynamic volume of instances. status() and cancel() are thread-safe; other functions are called on the
-/// host's thread.
+/// sequence or a dynamic volume of instances. status(), cancel() and wait() are thread-safe; for other functions the
+/// caller holds the viewer's state lock.
 class JobList {
  public:
   explicit JobList(JobContext context) : context_(std::move(context)) {}

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/feature_buffers.hpp"
+#include "render/film_values.hpp"
 #include "render/picture.hpp"
 
 namespace cumulet::render {
@@ -25,38 +26,45 @@ class FilmReader {
  public:
   explicit FilmReader(gl::FunctionsPtr gl) : gl_(std::move(gl)) {}
 
-  /// Reads width * height * 4 floats: mean radiance, with or without the background's, and alpha; (0,0) is the top
-  /// left.
-  void read(const Picture& picture, bool with_background, float* rgba) const;
-  /// Reads the samples that hit the volume before any surface, without background; alpha is their fraction.
-  void read_volume(const Picture& picture, float* rgba) const;
-  /// Reads width * height * 3 floats: mean radiance of a light group. with_background: including the sky and sun that
-  /// cameras see directly, if they are in the group.
-  void read_light_group(const Picture& picture, std::uint32_t group, bool with_background, float* rgb) const;
-  /// Reads the standard error of each pixel's luminance, background included; infinity for pixels with fewer than two
-  /// samples.
-  void read_error(const Picture& picture, float* errors) const;
+  /// Reads values.count() floats.
+  void read(const FilmValues& values, float* to) const;
   /// Reads an AOV from a feature buffer, values_of.count floats per pixel, after FeaturePass::find() has rendered it.
   void read_feature(const Picture& picture, const AovValues& values_of, float* values) const;
   [[nodiscard]] Totals totals(const Picture& picture) const;
 
  private:
-  struct PixelError {
-    std::uint32_t samples = 0;
-    std::uint32_t steps = 0;
-    double mean = 0.0;     // luminance
-    double squared = 0.0;  // its squared standard error; valid with at least two samples
+  // Copies of the sources of `values`. to: memory for the one in_place(); null: none.
+  class Copied {
+   public:
+    Copied(const gl::Functions& gl, const FilmValues& values, float* to);
+    [[nodiscard]] FilmValues::Copies all() const { return copies_; }
+
+   private:
+    std::vector<std::vector<std::byte>> memory_;
+    std::vector<const std::byte*> copies_;
   };
-  template <class Texel>
-  [[nodiscard]] std::vector<Texel> texels(const Picture& picture, const FilmLayer& layer, GLenum format,
-                                          GLenum type) const;
-  [[nodiscard]] std::vector<glm::uvec2> read_counts(const Picture& picture) const;
-  void read_means(const Picture& picture, const FilmLayer& sum, float* rgba) const;
-  // Calls visit with each pixel's error, row by row.
-  template <class Visit>
-  void for_each_error(const Picture& picture, Visit&& visit) const;
 
   gl::FunctionsPtr gl_;
+};
+
+/// Values on their way to main memory, without waiting: a copy in a pixel pack buffer, and a fence.
+class PendingRead {
+ public:
+  /// Queues the copies.
+  PendingRead(const gl::FunctionsPtr& gl, FilmValues values);
+  [[nodiscard]] const FilmValues& values() const { return values_; }
+  /// Whether the copies exist. Never waits.
+  [[nodiscard]] bool ready() const { return fence_.passed(); }
+  /// Writes values().count() floats. Only if it is ready.
+  void take(float* to) const;
+  /// GL memory.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+ private:
+  FilmValues values_;
+  std::size_t bytes_ = 0;
+  gl::ReadBack buffer_;
+  gl::Fence fence_;
 };
 
 }  // namespace cumulet::render

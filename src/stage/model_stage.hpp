@@ -19,7 +19,7 @@
 
 namespace cumulet::viewer {
 
-/// The viewer's own surfaces, and models. Functions are called on the host's thread. Functions that change settings
+/// The viewer's own surfaces, and models. Functions are called under the state lock. Functions that change settings
 /// have the contract of those of Viewer with the same name.
 class ModelStage {
  public:

@@ -17,7 +17,7 @@
 
 namespace cumulet::viewer {
 
-/// Sun, sky, environment, the host's lights and the settings of the ground. Functions are called on the host's thread.
+/// Sun, sky, environment, the host's lights and the settings of the ground. Functions are called under the state lock.
 /// Functions that change settings have the contract of those of Viewer with the same name.
 class SkyStage {
  public:

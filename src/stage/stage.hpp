@@ -20,8 +20,8 @@
 
 namespace cumulet::viewer {
 
-/// Everything that a viewer shows, free of GL: prepares frames, and makes their snapshots. Functions are called on the
-/// host's thread. Functions that change settings have the contract of those of Viewer with the same name.
+/// Everything that a viewer shows, free of GL: prepares frames, and makes their snapshots. Functions are called under
+/// the state lock. Functions that change settings have the contract of those of Viewer with the same name.
 class Stage {
  public:
   /// jobs, failures, host: outlive the stage.

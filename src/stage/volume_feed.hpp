@@ -22,7 +22,7 @@ struct FeedContext {
 };
 
 /// Requests grids of a source of volumes, and takes them one after another. The viewer's own volume and instances use
-/// the same classes. Functions are called on the host's thread.
+/// the same classes. Functions are called under the state lock.
 class VolumeFeed {
  public:
   explicit VolumeFeed(const FeedContext& context) : id_(context.id), last_taken_(context.last_taken) {}

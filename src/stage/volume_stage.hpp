@@ -43,7 +43,7 @@ struct GridTotals {
 };
 
 /// The viewer's own volume, sequence or dynamic volume, and instances: which grids are requested, and which are shown.
-/// Functions are called on the host's thread. Functions that change settings have the contract of those of Viewer with
+/// Functions are called under the state lock. Functions that change settings have the contract of those of Viewer with
 /// the same name.
 class VolumeStage {
  public:

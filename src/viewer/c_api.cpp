@@ -171,7 +171,7 @@ void cumulet_destroy(cumulet_viewer* viewer) {
 
 const char* cumulet_last_error(const cumulet_viewer* viewer) {
   if (cumulet::CallbackScope::inside()) return inside_callback;
-  return viewer == nullptr ? "viewer is NULL" : viewer->last_error.c_str();
+  return viewer == nullptr ? "viewer is NULL" : viewer->last_errors.get();
 }
 
 cumulet_status cumulet_attach(cumulet_viewer* viewer, cumulet_get_proc_fn get_proc, void* get_proc_user) {
@@ -192,25 +192,25 @@ cumulet_status cumulet_context_lost(cumulet_viewer* viewer) {
 // ---- volumes ----
 
 cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const char* path, const char* grid_name) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
     v.load_volume({path, {.density = grid_name == nullptr ? "" : grid_name}});
   });
 }
 
 cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, const cumulet_volume_file_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.load_volume(to_volume_file(desc)); });
+  return with_state(viewer, [&](core::Viewer& v) { v.load_volume(to_volume_file(desc)); });
 }
 
 cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_volume* volume) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     v.set_volume(volume == nullptr ? nullptr : volume->asset);
     viewer->volume.keep(volume);
   });
 }
 
 cumulet_status cumulet_set_sequence(cumulet_viewer* viewer, cumulet_sequence* sequence) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_sequence(sequence == nullptr ? nullptr : sequence->asset); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_sequence(sequence == nullptr ? nullptr : sequence->asset); });
 }
 
 namespace {
@@ -250,14 +250,14 @@ void tell_sequence(const core::Viewer::SequenceStatus& status, cumulet_sequence_
 
 cumulet_status cumulet_get_sequence_info(cumulet_viewer* viewer, cumulet_sequence_info* info, uint8_t* states,
                                          size_t count) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     read_desc(info, "cumulet_sequence_info");
     tell_sequence(v.sequence(), info, states, count);
   });
 }
 
 cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame, char* cause, size_t size) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(cause != nullptr && size > 0, "the buffer for the cause is NULL or empty");
     const std::optional<cumulet::Error> failure = v.frame_failure(frame);
     copy_text(failure ? failure->what() : "", cause, size);
@@ -266,7 +266,7 @@ cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, uint32_t frame
 
 cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* viewer, cumulet_instance* instance,
                                                   cumulet_sequence_info* info, uint8_t* states, size_t count) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
     read_desc(info, "cumulet_sequence_info");
     tell_sequence(v.sequence(*instance->asset), info, states, count);
@@ -275,7 +275,7 @@ cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* viewer, cumule
 
 cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumulet_instance* instance, uint32_t frame,
                                                    char* cause, size_t size) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
     require(cause != nullptr && size > 0, "the buffer for the cause is NULL or empty");
     const std::optional<cumulet::Error> failure = v.frame_failure(*instance->asset, frame);
@@ -284,11 +284,11 @@ cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* viewer, cumul
 }
 
 cumulet_status cumulet_set_dynamic_volume(cumulet_viewer* viewer, cumulet_dynamic_volume* live) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_live(live == nullptr ? nullptr : live->asset); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_live(live == nullptr ? nullptr : live->asset); });
 }
 
 cumulet_status cumulet_get_dynamic_volume_info(cumulet_viewer* viewer, cumulet_dynamic_volume_info* info) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     read_desc(info, "cumulet_dynamic_volume_info");
     tell_live(v.live(), info);
   });
@@ -296,7 +296,7 @@ cumulet_status cumulet_get_dynamic_volume_info(cumulet_viewer* viewer, cumulet_d
 
 cumulet_status cumulet_get_instance_dynamic_volume_info(cumulet_viewer* viewer, cumulet_instance* instance,
                                                         cumulet_dynamic_volume_info* info) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
     read_desc(info, "cumulet_dynamic_volume_info");
     tell_live(v.live(*instance->asset), info);
@@ -304,7 +304,7 @@ cumulet_status cumulet_get_instance_dynamic_volume_info(cumulet_viewer* viewer, 
 }
 
 cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     const cumulet_limits_desc d = read_desc(desc, "cumulet_limits_desc");
     require(d.threads <= 1024, "cumulet_limits_desc.threads is above 1024");
     core::Viewer::Limits limits;
@@ -316,7 +316,7 @@ cumulet_status cumulet_set_limits(cumulet_viewer* viewer, const cumulet_limits_d
 }
 
 cumulet_status cumulet_set_volume_transforms(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::InstanceTransform> transforms = transforms_of(to_world, count);
     if (transforms.empty()) transforms.emplace_back();
     v.set_transforms(transforms);
@@ -324,12 +324,12 @@ cumulet_status cumulet_set_volume_transforms(cumulet_viewer* viewer, const doubl
 }
 
 cumulet_status cumulet_set_previous_volume_transforms(cumulet_viewer* viewer, const double* to_world, uint32_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_previous_transforms(transforms_of(to_world, count)); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_previous_transforms(transforms_of(to_world, count)); });
 }
 
 cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, const double* open, const double* close,
                                                      uint32_t count) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     std::vector<cumulet::scene::InstanceTransform> transforms = v.transforms();
     const bool ends = open != nullptr || close != nullptr;
     require(!ends || count == transforms.size(),
@@ -348,7 +348,7 @@ cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer* viewer, con
 }
 
 cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
     const auto volume = v.volume();
@@ -357,28 +357,28 @@ cumulet_status cumulet_get_volume(cumulet_viewer* viewer, cumulet_volume** out) 
 }
 
 cumulet_status cumulet_add_model(cumulet_viewer* viewer, cumulet_model* model) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(model != nullptr, "the model is NULL");
     v.add_model(model->asset);
   });
 }
 
 cumulet_status cumulet_remove_model(cumulet_viewer* viewer, cumulet_model* model) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(model != nullptr, "the model is NULL");
     v.remove_model(*model->asset);
   });
 }
 
 cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_instance* instance) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
     v.add_instance(instance->asset);
   });
 }
 
 cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumulet_instance* instance) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(instance != nullptr, "the instance is NULL");
     v.remove_instance(*instance->asset);
   });
@@ -392,7 +392,7 @@ void cumulet_cancel(cumulet_viewer* viewer) {
 cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_progress* progress) {
   if (viewer == nullptr || viewer->process != getpid()) return CUMULET_ERROR_INVALID_ARGUMENT;
   const cumulet::HostCall host_call;
-  std::string unused;  // last_error belongs to the rendering thread
+  std::string unused;  // the last error stays
   return cumulet::c_abi::guarded(unused, [&] {
     const auto status = viewer->viewer->status();
     cumulet_progress p{};
@@ -418,21 +418,21 @@ cumulet_status cumulet_wait(cumulet_viewer* viewer, double timeout_ms) {
 }
 
 cumulet_status cumulet_rebuild(cumulet_viewer* viewer) {
-  return guarded(viewer, [](core::Viewer& v) { v.rebuild(); });
+  return with_state(viewer, [](core::Viewer& v) { v.rebuild(); });
 }
 
 // ---- settings ----
 
 cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_grid(core::GridSettings::of(read_settings(desc))); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_grid(core::GridSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_medium(core::Medium::of(read_settings(desc))); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_medium(core::Medium::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points, uint64_t count) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     ParsedRamp read = read_ramp(ramp, points, count);
     core::Ramps ramps = v.ramps();
     ramps.*read.target = std::move(read.ramp);
@@ -441,29 +441,29 @@ cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const
 }
 
 cumulet_status cumulet_set_sun_sky(cumulet_viewer* viewer, const cumulet_sun_sky_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_light(core::Light::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_lights(cumulet_viewer* viewer, const cumulet_light_desc* lights, uint64_t count) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_lights(cumulet::c_abi::analytic_lights_of(lights, count)); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_lights(cumulet::c_abi::analytic_lights_of(lights, count)); });
 }
 
 cumulet_status cumulet_load_environment(cumulet_viewer* viewer, const char* path) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
     v.load_environment(path);
   });
 }
 
 cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumulet_environment* environment) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     v.set_environment(environment == nullptr ? nullptr : environment->asset);
     viewer->environment.keep(environment);
   });
 }
 
 cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environment** out) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
     *out = viewer->environment.of(v.environment());
@@ -471,30 +471,30 @@ cumulet_status cumulet_get_environment(cumulet_viewer* viewer, cumulet_environme
 }
 
 cumulet_status cumulet_set_environment_settings(cumulet_viewer* viewer, const cumulet_environment_settings_desc* desc) {
-  return guarded(
+  return with_state(
       viewer, [&](core::Viewer& v) { v.set_environment_settings(core::EnvironmentSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_ground(cumulet_viewer* viewer, const cumulet_ground_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_ground(core::GroundSettings::of(read_settings(desc))); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_ground(core::GroundSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const char* path) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(path != nullptr && *path != '\0', "path is NULL or empty");
     v.load_surfaces(path);
   });
 }
 
 cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, cumulet_surfaces* surfaces) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     v.set_surfaces(surfaces == nullptr ? nullptr : surfaces->asset);
     viewer->surfaces.keep(surfaces);
   });
 }
 
 cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** out) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
     *out = viewer->surfaces.of(v.surfaces_asset());
@@ -502,16 +502,16 @@ cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_surfaces** o
 }
 
 cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer, const cumulet_surface_settings_desc* desc) {
-  return guarded(viewer,
-                 [&](core::Viewer& v) { v.set_surface_settings(core::SurfaceSettings::of(read_settings(desc))); });
+  return with_state(viewer,
+                    [&](core::Viewer& v) { v.set_surface_settings(core::SurfaceSettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_use_surface_camera(cumulet_viewer* viewer, uint32_t index) {
-  return guarded(viewer, [&](core::Viewer& v) { v.use_surface_camera(index); });
+  return with_state(viewer, [&](core::Viewer& v) { v.use_surface_camera(index); });
 }
 
 cumulet_status cumulet_set_sampling(cumulet_viewer* viewer, const cumulet_sampling_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_sampling(core::Sampling::of(read_settings(desc))); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_sampling(core::Sampling::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_region_pixels(const float region[4], uint32_t width, uint32_t height, uint32_t pixels[4]) {
@@ -531,21 +531,21 @@ cumulet_status cumulet_region_pixels(const float region[4], uint32_t width, uint
 // ---- camera and input ----
 
 cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, cumulet_camera* camera, double seconds) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(in_range(seconds, -1e9, 1e9), "seconds is not from -1e9 to 1e9");
     v.set_previous_camera(camera != nullptr ? camera->asset : nullptr, seconds);
   });
 }
 
 cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_camera* camera) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(camera != nullptr, "camera is NULL");
     v.set_camera(camera->asset);
   });
 }
 
 cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_camera** out) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(out != nullptr, "out is NULL");
     *out = nullptr;
     *out = new cumulet_camera{v.camera()};
@@ -553,11 +553,11 @@ cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_camera** out) 
 }
 
 cumulet_status cumulet_frame_all(cumulet_viewer* viewer) {
-  return guarded(viewer, [](core::Viewer& v) { v.frame_all(); });
+  return with_state(viewer, [](core::Viewer& v) { v.frame_all(); });
 }
 
 cumulet_status cumulet_set_navigation(cumulet_viewer* viewer, const cumulet_navigation_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     const cumulet_navigation_desc d = read_settings(desc);
     v.set_navigation(
         {static_cast<core::NavigationStyle>(d.style), d.fly == 1, d.speed, d.turntable_degrees_per_second});
@@ -565,7 +565,7 @@ cumulet_status cumulet_set_navigation(cumulet_viewer* viewer, const cumulet_navi
 }
 
 cumulet_status cumulet_input(cumulet_viewer* viewer, const cumulet_event* event, int32_t* handled) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     const cumulet_event e = read_desc(event, "cumulet_event");
     require(number(e.type) <= CUMULET_EVENT_FOCUS_LOST, "cumulet_event.type is unknown");
     require(number(e.button) <= CUMULET_BUTTON_RIGHT, "cumulet_event.button is unknown");
@@ -648,7 +648,7 @@ cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, double y, cumul
 }
 
 cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box_min[3], double box_max[3]) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     require(box_min != nullptr && box_max != nullptr, "box_min or box_max is NULL");
     const core::Bounds box = v.bounds();
     for (int axis = 0; axis < 3; ++axis) {
@@ -775,6 +775,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.steps = had.steps;
     s.noise = had.noise.value_or(unknown_noise);
     s.nonfinite_samples = had.samples_not_finite;
+    const core::StateLock::Held held = v.hold_state();
     if (const auto volume_info = v.volume_info()) {
       const core::Bounds bounds = v.bounds_of(*volume_info);
       for (int axis = 0; axis < 3; ++axis) {

@@ -37,11 +37,11 @@ render::DisplayLutPtr display_lut_of(const cumulet_display_lut_desc& d) {
 }  // namespace
 
 cumulet_status cumulet_set_display(cumulet_viewer* viewer, const cumulet_display_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) { v.set_display(core::DisplaySettings::of(read_settings(desc))); });
+  return with_state(viewer, [&](core::Viewer& v) { v.set_display(core::DisplaySettings::of(read_settings(desc))); });
 }
 
 cumulet_status cumulet_set_display_lut(cumulet_viewer* viewer, const cumulet_display_lut_desc* desc) {
-  return guarded(viewer, [&](core::Viewer& v) {
+  return with_state(viewer, [&](core::Viewer& v) {
     v.set_display_lut(desc == nullptr ? nullptr : display_lut_of(read_desc(desc, "cumulet_display_lut_desc")));
   });
 }

@@ -4,17 +4,43 @@
 
 #include <unistd.h>
 
+#include <map>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "viewer/c_handles.hpp"
 #include "viewer/c_support.hpp"
 #include "viewer/viewer.hpp"
 
+namespace cumulet::c_abi {
+
+/// Each thread's last error. All calls are safe from any thread.
+class LastErrors {
+ public:
+  void set(std::string line) {
+    const std::scoped_lock lock(mutex_);
+    of_thread_[std::this_thread::get_id()].swap(line);
+  }
+  /// Valid until the calling thread's next set().
+  [[nodiscard]] const char* get() const {
+    const std::scoped_lock lock(mutex_);
+    const auto found = of_thread_.find(std::this_thread::get_id());
+    return found == of_thread_.end() ? "" : found->second.c_str();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::thread::id, std::string> of_thread_;
+};
+
+}  // namespace cumulet::c_abi
+
 struct cumulet_viewer {
   std::unique_ptr<cumulet::viewer::Viewer> viewer;
-  std::string last_error;
+  cumulet::c_abi::LastErrors last_errors;
   pid_t process = getpid();  // a forked child has neither the viewer's threads nor its context
   cumulet::c_abi::KeptHandle<cumulet_volume> volume;
   cumulet::c_abi::KeptHandle<cumulet_surfaces> surfaces;
@@ -23,16 +49,31 @@ struct cumulet_viewer {
 
 namespace cumulet::c_abi {
 
-/// Runs a call on a viewer, with the checks of the other overloads. The message of an exception becomes its last error.
+/// Runs a call on a viewer, with the checks of the other overloads. The message of an exception becomes the last error.
 template <class Call>
 cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
-  // Inside a callback last_error must not be touched, because another thread may be in a call.
+  // Inside a callback the last error stays that of the call which runs the callback.
   if (viewer == nullptr || CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
   const HostCall host_call;
-  return guarded(viewer->last_error, [&] {
+  std::string message;
+  const cumulet_status status = guarded(message, [&] {
     if (host_call.refused()) throw Error(ErrorCode::cancelled, process_exits);
     if (viewer->process != getpid()) refuse("the viewer belongs to the process that forked this one");
     call(*viewer->viewer);
+  });
+  try {
+    viewer->last_errors.set(std::move(message));
+  } catch (...) {  // no memory for this thread's first line
+  }
+  return status;
+}
+
+/// The same for a call that needs the viewer's state lock.
+template <class Call>
+cumulet_status with_state(cumulet_viewer* viewer, Call&& call) noexcept {
+  return guarded(viewer, [&](viewer::Viewer& v) {
+    const viewer::StateLock::Held held = v.hold_state();
+    call(v);
   });
 }
 

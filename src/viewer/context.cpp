@@ -122,9 +122,11 @@ scene::SequenceFrames Context::uploaded_frames() const {
   return frames;
 }
 
-bool Context::has_pending_frame(const scene::SequenceFrame& frame) const {
-  if (scene::holds(shown_frames(), frame)) return false;
-  return scene::holds(uploaded_frames(), frame) ? progressive_.has_pending_picture() : scene_.uploading_volumes();
+FramesInContext Context::frames() const {
+  return {.shown = progressive_.shown_frames(),
+          .uploaded = uploaded_frames(),
+          .picture_pending = progressive_.has_pending_picture(),
+          .uploading = scene_.uploading_volumes()};
 }
 
 render::PictureRequest Context::request(const Shot& shot, const Frame& frame, const render::TraceInputs& inputs) const {
@@ -433,7 +435,9 @@ std::uint64_t Context::bytes() const {
   const glm::u64vec2 depth_size = host_depth_.size();
   std::uint64_t maps = 0;
   for (const auto& [slot, map] : maps_) maps += map.bytes();
-  return scene_.data_bytes() + scene_.other_bytes() + maps + progressive_.bytes() + empty_.bytes() +
+  std::uint64_t reads = 0;
+  for (const auto& [number, read] : reads_) reads += read.pending.bytes();
+  return scene_.data_bytes() + scene_.other_bytes() + maps + reads + progressive_.bytes() + empty_.bytes() +
          compositor_.bytes() + transfers_.bytes() + memories_->bytes() + (target_ ? target_.of().bytes() : 0) +
          depth_size.x * depth_size.y * host_depth_.layers() * 4;
 }

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/error.hpp"
 #include "base/revision.hpp"
@@ -56,6 +57,14 @@ struct Shot {
   [[nodiscard]] const std::optional<scene::Viewpoint>& view() const { return *scene->view; }
 };
 
+/// A color behind an image. Pixels outside of the box have none.
+struct Backdrop {
+  glm::uvec2 size{0U};
+  render::PixelBox box;
+  std::optional<glm::vec3> color;
+  void put_behind(std::span<float> rgba) const;
+};
+
 /// All of a viewer's objects in one GL context: renders shots. All calls except simple queries need the context current
 /// and a StateGuard.
 class Context {
@@ -97,10 +106,7 @@ class Context {
   void draw(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Continues denoising for the next frame that draws.
   void denoise_undrawn(const Shot& shot, const Frame& frame, render::Picture& shown);
-  /// Displayed frames of sequences.
-  [[nodiscard]] scene::SequenceFrames shown_frames() const { return progressive_.shown_frames(); }
-  /// Returns true if this frame, which was uploaded last or is being uploaded, has not been displayed yet and will be.
-  [[nodiscard]] bool has_pending_frame(const scene::SequenceFrame& frame) const;
+  [[nodiscard]] FramesInContext frames() const;
   /// Fills in the result after the frame.
   void report(const Shot& shot, const Frame& frame, FrameResult& result);
   /// Returns true if a failure should be reported. A program that fails to build fails in every frame until a setting
@@ -136,6 +142,13 @@ class Context {
   /// Reads the denoised image; only for shaded images with traced surfaces. Throws Error(unsupported) for others.
   /// Without a network it uses the real-time filter.
   void read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count);
+  /// Read without waiting. number: of the read, a new one. Throws Error(invalid_argument) for values that samples do
+  /// not accumulate, and if too many reads are pending.
+  void begin_read(const DisplaySettings& settings, const ReadRequest& request, std::uint64_t number);
+  /// values: receives the values if they are ready, which ends the read; null: none. Throws Error(invalid_argument) if
+  /// there is no such read, or `count` is too small.
+  ReadState finish_read(std::uint64_t number, float* values, std::size_t count);
+  void cancel_read(std::uint64_t number) { reads_.erase(number); }
   /// State of the accumulated samples. Both throw Error(invalid_argument) for images with previews and for debug views.
   [[nodiscard]] std::size_t accumulation_bytes();
   void read_accumulation(std::span<std::byte> bytes);
@@ -208,13 +221,19 @@ class Context {
   // Returns the image denoised by the network, row 0 at the top. The image must have its feature buffers.
   gl::Object by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network);
   gl::Object filtered(const render::Picture& picture, bool with_background);
-  // Reads mean radiance, with or without that of the background, and alpha, including surfaces drawn beneath a preview.
+  // Mean radiance, with or without that of the background, and alpha, including surfaces drawn beneath a preview.
+  // drawn: receives the textures that are drawn for it, which must live until the values were copied.
+  render::FilmValues means_of(render::Picture& picture, bool with_background, std::vector<gl::Object>& drawn);
   void read_means(render::Picture& picture, bool with_background, float* rgba);
+  // Values that samples accumulate. Both throw Error(invalid_argument) for values that were not accumulated.
+  render::FilmValues accumulated_aov(render::Picture& picture, Aov aov, std::vector<gl::Object>& drawn);
+  static render::FilmValues light_group_of(const DisplaySettings& settings, const render::Picture& picture,
+                                           std::uint32_t group);
   // Returns an image that consists only of samples, after all in-flight dispatches have completed. Throws if there is
   // none.
   render::Picture& accumulating();
-  // Reads the compositor's output as linear radiance.
-  void read_composite(render::Picture& picture, bool transparent, float* rgba);
+  // Draws the compositor's output as linear radiance.
+  gl::Object draw_composite(render::Picture& picture, bool transparent);
   [[nodiscard]] static render::PictureGuides guides_of(const render::Picture& picture);
   [[nodiscard]] render::PictureView view_of(const render::Picture& picture) const;
   [[nodiscard]] render::PictureTextures textures_of(const render::Picture& picture,
@@ -245,10 +264,15 @@ class Context {
   std::optional<std::uint64_t> alone_failed_;  // settings at which drawing surfaces without a volume failed
   Slot<TargetTextures, TargetKind> target_;
   std::map<std::uint32_t, render::TransmittanceMap> maps_;  // by slot
-  std::unique_ptr<render::ShaderWarmUp> shader_warm_up_;    // in progress
-  double warm_ = 0.0;                                       // fraction of the warm-up that was reported
-  std::optional<Error> unbuilt_;                            // the first build failure of the warm-up, thrown at its end
-  std::optional<std::uint64_t> tried_;                      // settings at which failed programs were retried
+  struct Read {
+    render::PendingRead pending;
+    Backdrop backdrop;
+  };
+  std::map<std::uint64_t, Read> reads_;                   // by number
+  std::unique_ptr<render::ShaderWarmUp> shader_warm_up_;  // in progress
+  double warm_ = 0.0;                                     // fraction of the warm-up that was reported
+  std::optional<Error> unbuilt_;                          // the first build failure of the warm-up, thrown at its end
+  std::optional<std::uint64_t> tried_;                    // settings at which failed programs were retried
   bool knows_dispatches_ = false;
 };
 

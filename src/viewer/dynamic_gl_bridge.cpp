@@ -1,6 +1,7 @@
 #include "viewer/dynamic_gl_bridge.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <variant>
@@ -138,12 +139,25 @@ void DynamicGlBridge::submit(Context& g, const std::shared_ptr<Live>& live, cons
 
 void DynamicGlBridge::track(const std::shared_ptr<Live>& live) {
   if (live->values_wanted() == nullptr) return;
-  if (std::ranges::any_of(tracked_, [&](const InGl& in_gl) { return in_gl.live.lock() == live; })) return;
-  tracked_.push_back({.live = live,
-                      .listeners = {live->values_wanted()->listen(notify_), live->listen_to_requests(notify_)},
-                      .brought = {},
-                      .made = {},
-                      .made_by = {}});
+  const auto is_it = [&](const InGl& in_gl) { return in_gl.live.lock() == live; };
+  const std::scoped_lock lock(mutex_);
+  if (std::ranges::any_of(tracked_, is_it) || std::ranges::any_of(added_, is_it)) return;
+  added_.push_back({.live = live,
+                    .listeners = {live->values_wanted()->listen(notify_), live->listen_to_requests(notify_)},
+                    .brought = {},
+                    .made = {},
+                    .made_by = {}});
+}
+
+void DynamicGlBridge::clear() {
+  const std::scoped_lock lock(mutex_);
+  added_.clear();
+  tracked_.clear();
+}
+
+bool DynamicGlBridge::empty() const {
+  const std::scoped_lock lock(mutex_);
+  return tracked_.empty() && added_.empty();
 }
 
 void DynamicGlBridge::bring_back(Context& g, const std::shared_ptr<Live>& live,
@@ -216,7 +230,12 @@ bool DynamicGlBridge::is_due(Context& g) const {
 }
 
 void DynamicGlBridge::update(Context& g) {
-  std::erase_if(tracked_, [](const InGl& in_gl) { return in_gl.live.expired(); });
+  {
+    const std::scoped_lock lock(mutex_);
+    std::ranges::move(added_, std::back_inserter(tracked_));
+    added_.clear();
+    std::erase_if(tracked_, [](const InGl& in_gl) { return in_gl.live.expired(); });
+  }
   for (InGl& in_gl : tracked_) {
     const std::shared_ptr<Live> live = in_gl.live.lock();
     const scene::StateInGlPtr state = live ? live->in_gl().state : nullptr;

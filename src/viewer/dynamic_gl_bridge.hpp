@@ -4,6 +4,7 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ namespace cumulet::viewer {
 class Context;
 
 /// Moves states of dynamic volumes from GL to main memory, and makes the emission of states that stay GPU-resident.
+/// track() may be called on any thread; other calls must not overlap.
 class DynamicGlBridge {
  public:
   /// notify: called on any thread when voxels or emission are requested.
@@ -32,8 +34,8 @@ class DynamicGlBridge {
               const std::vector<volume::Channel>& channels);
   /// Registers a dynamic volume with GPU-resident states for per-frame service (read-back, emission).
   void track(const std::shared_ptr<Live>& live);
-  void clear() { tracked_.clear(); }
-  [[nodiscard]] bool empty() const { return tracked_.empty(); }
+  void clear();
+  [[nodiscard]] bool empty() const;
   /// For GPU-resident states: starts the computation of emission and the transfer to main memory, as requested.
   void update(Context& g);
   /// True if such work is pending.
@@ -62,6 +64,8 @@ class DynamicGlBridge {
   static void gather(Context& g, Live& live);
 
   std::function<void()> notify_;
+  mutable std::mutex mutex_;  // of added_, and of changes to the number of tracked_
+  std::vector<InGl> added_;   // since the last update()
   std::vector<InGl> tracked_;
 };
 

@@ -10,6 +10,7 @@
 #include "render/display.hpp"
 #include "render/feature_buffers.hpp"
 #include "render/host_depth.hpp"
+#include "scene/snapshot.hpp"
 
 namespace cumulet::viewer {
 
@@ -44,6 +45,20 @@ struct FrameResult {
   glm::uvec2 size{0U};
   GLuint texture = 0;
   GLuint depth_texture = 0;
+};
+
+/// The frames of sequences and states of dynamic volumes in a context, as known outside of calls that use it.
+struct FramesInContext {
+  scene::SequenceFrames shown;
+  scene::SequenceFrames uploaded;
+  bool picture_pending = false;  ///< an image of the uploaded ones will be shown
+  bool uploading = false;
+  bool in_work = false;  ///< a call that will change this is running
+  /// Returns true if this frame, which was uploaded last or is being uploaded, has not been displayed yet and will be.
+  [[nodiscard]] bool is_pending(const scene::SequenceFrame& frame) const {
+    if (scene::holds(shown, frame)) return false;
+    return in_work || (scene::holds(uploaded, frame) ? picture_pending : uploading);
+  }
 };
 
 /// Progress of cumulet_warm_up.
@@ -104,5 +119,20 @@ struct MatteObject {
 using MatteIdOf = std::function<std::uint32_t(const MatteObject&)>;
 
 using render::Aov;
+
+/// cumulet_read_desc, checked.
+struct ReadRequest {
+  enum class Source { linear = 0, aov = 1, light_group = 2 };
+  Source source = Source::linear;
+  Aov aov = Aov::beauty;
+  std::uint32_t light_group = 0;
+};
+
+/// State of a read that was begun.
+struct ReadState {
+  bool ready = false;
+  glm::uvec2 size{0U};
+  std::uint32_t channels = 0;
+};
 
 }  // namespace cumulet::viewer

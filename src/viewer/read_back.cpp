@@ -22,6 +22,9 @@ using glm::dvec3;
 
 namespace {
 
+constexpr const char* nothing_rendered = "nothing has been rendered yet";
+constexpr const char* only_shaded = "the image is a debug view: only shaded images have AOVs";
+constexpr std::size_t max_reads = 16;
 constexpr std::uint64_t max_denoiser_bytes = std::uint64_t{512} << 20U;
 
 // Returns true if the whole image, including surfaces, consists of light samples.
@@ -40,24 +43,17 @@ std::uint32_t rays_to_denoise(const render::Picture& picture) {
       std::clamp<std::uint64_t>(2 * picture.samples_per_pixel(), render::feature_rays, render::max_feature_rays));
 }
 
-// Returns the number of floats of a four-channel image. Throws Error(invalid_argument) if the array is too small.
-std::size_t require_room(const render::Picture& picture, const float* rgba, std::size_t count) {
-  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 4;
-  if (rgba == nullptr || count < floats) {
-    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
-  }
-  return floats;
+std::size_t pixels_of(const render::Picture& picture) { return std::size_t{picture.size().x} * picture.size().y; }
+
+// Returns the display's backdrop, if any. Pixels outside the render region stay 0.
+Backdrop backdrop_of(const render::Display& display, const render::Picture& picture) {
+  return {picture.size(), picture.box(), display.transparent ? std::nullopt : display.backdrop};
 }
 
-// Composites over the display's backdrop, if any. Pixels outside the render region stay 0.
-void put_before(const render::Display& display, const render::Picture& picture, std::span<float> rgba) {
-  if (display.transparent || !display.backdrop) return;
-  for (std::size_t i = 0; i < rgba.size(); ++i) {
-    const std::size_t c = i % 4;
-    const std::size_t pixel = i / 4;
-    const bool made = picture.box().holds({pixel % picture.size().x, pixel / picture.size().x});
-    if (c != 3 && made) rgba[i] += (1.0F - rgba[i - c + 3]) * (*display.backdrop)[static_cast<int>(c)];
-  }
+// Throws Error(invalid_argument) if the array is too small.
+void require_floats(const float* values, std::size_t count, std::size_t needed) {
+  if (values == nullptr || count < needed)
+    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(needed) + " floats");
 }
 
 // Fills in the model that the ray hit. pick.position is relative to the snapshot's origin.
@@ -95,6 +91,16 @@ void set_hit(Pick& pick, const render::ModelInstances& models, std::uint32_t tri
 
 }  // namespace
 
+void Backdrop::put_behind(std::span<float> rgba) const {
+  if (!color) return;
+  for (std::size_t i = 0; i < rgba.size(); ++i) {
+    const std::size_t c = i % 4;
+    const std::size_t pixel = i / 4;
+    const bool made = box.holds({pixel % size.x, pixel / size.x});
+    if (c != 3 && made) rgba[i] += (1.0F - rgba[i - c + 3]) * (*color)[static_cast<int>(c)];
+  }
+}
+
 Pick Context::pick(const Shot& shot, double x, double y) {
   const auto& view = shot.view();
   if (scene_.data() == nullptr || !view || !(x >= 0.0 && y >= 0.0 && x < shot.size.x && y < shot.size.y)) return {};
@@ -127,29 +133,25 @@ Pick Context::pick(const Shot& shot, double x, double y) {
 render::Picture& Context::readable() {
   progressive_.settle();
   render::Picture* picture = progressive_.newest();
-  if (picture == nullptr) throw Error(ErrorCode::invalid_argument, "nothing has been rendered yet");
+  if (picture == nullptr) throw Error(ErrorCode::invalid_argument, nothing_rendered);
   return *picture;
 }
 
-void Context::read_means(render::Picture& picture, bool with_background, float* rgba) {
-  if (picture.layered() != render::Layered::beneath) {
-    render::FilmReader(functions_).read(picture, with_background, rgba);
-    return;
-  }
-  std::vector<float> opaque;
-  if (with_background) {
-    opaque.resize(std::size_t{picture.size().x} * picture.size().y * 4);
-    read_composite(picture, false, opaque.data());
-  }
-  read_composite(picture, true, rgba);
-  for (std::size_t i = 0; i < opaque.size(); ++i) {
-    if (i % 4 != 3) rgba[i] = opaque[i];
-  }
+render::FilmValues Context::means_of(render::Picture& picture, bool with_background, std::vector<gl::Object>& drawn) {
+  if (picture.layered() != render::Layered::beneath) return render::FilmValues::means(picture, with_background);
+  drawn.push_back(draw_composite(picture, true));
+  if (with_background) drawn.push_back(draw_composite(picture, false));
+  return render::FilmValues::drawn(picture.size(), drawn.front().name(), with_background ? drawn.back().name() : 0);
 }
 
-void Context::read_composite(render::Picture& picture, bool transparent, float* rgba) {
+void Context::read_means(render::Picture& picture, bool with_background, float* rgba) {
+  std::vector<gl::Object> drawn;
+  render::FilmReader(functions_).read(means_of(picture, with_background, drawn), rgba);
+}
+
+gl::Object Context::draw_composite(render::Picture& picture, bool transparent) {
   const glm::ivec2 size(picture.size());
-  const gl::Object flat = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the texture to read");
+  gl::Object flat = gl::make_texture_2d(functions_, GL_RGBA32F, size.x, size.y, "creating the texture to read");
   const gl::TransientFramebuffer framebuffer(functions_, flat.name(), 0);
   functions_->ClearTexImage(flat.name(), 0, GL_RGBA, GL_FLOAT, nullptr);
   render::Display display;
@@ -163,14 +165,14 @@ void Context::read_composite(render::Picture& picture, bool transparent, float* 
   target.blend_over = false;
   target.wait = render::Wait::always;
   composite(picture.film(), textures_of(picture, nullptr), display, target);
-  functions_->GetTextureImage(flat.name(), 0, GL_RGBA, GL_FLOAT, size.x * size.y * 16, rgba);
-  gl::check(*functions_, "reading back the image");
+  gl::check(*functions_, "drawing the image to read");
+  return flat;
 }
 
 render::Picture& Context::readable_shaded() {
   render::Picture& picture = readable();
   if (picture.view() != render::View::shaded) {
-    throw Error(ErrorCode::invalid_argument, "the image is a debug view: only shaded images have AOVs");
+    throw Error(ErrorCode::invalid_argument, only_shaded);
   }
   return picture;
 }
@@ -186,47 +188,48 @@ void Context::require_present(bool also) const {
 void Context::read_aov(const Shot& shot, Aov aov, float* values, std::size_t count) {
   render::Picture& picture = readable_shaded();
   const render::AovValues& values_of = render::aov_values.at(static_cast<std::size_t>(aov));
-  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * values_of.count;
-  if (values == nullptr || count < floats) {
-    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
-  }
+  require_floats(values, count, pixels_of(picture) * values_of.count);
   const render::FilmReader reader(functions_);
   if (const render::FeatureBuffer* buffer = render::feature_buffer_of(values_of.layer)) {
     find_features(shot, picture, buffer->set);
     reader.read_feature(picture, values_of, values);
-  } else if (aov == Aov::beauty) {
-    read_means(picture, false, values);
-  } else if (aov == Aov::volume) {
-    if (!picture.separate_volume_aov()) {
-      throw Error(ErrorCode::invalid_argument,
-                  "the volume AOV was not rendered: set cumulet_sampling_desc.separate_volume_aov and render at full "
-                  "resolution");
-    }
-    reader.read_volume(picture, values);
-  } else {
-    reader.read_error(picture, values);
+    return;
   }
+  std::vector<gl::Object> drawn;
+  reader.read(accumulated_aov(picture, aov, drawn), values);
+}
+
+render::FilmValues Context::accumulated_aov(render::Picture& picture, Aov aov, std::vector<gl::Object>& drawn) {
+  if (aov == Aov::beauty) return means_of(picture, false, drawn);
+  if (aov != Aov::volume) return render::FilmValues::errors(picture);
+  if (!picture.separate_volume_aov()) {
+    throw Error(ErrorCode::invalid_argument,
+                "the volume AOV was not rendered: set cumulet_sampling_desc.separate_volume_aov and render at full "
+                "resolution");
+  }
+  return render::FilmValues::volume(picture);
 }
 
 void Context::read_light_group(const DisplaySettings& settings, std::uint32_t group, float* rgb, std::size_t count) {
-  const render::Picture& picture = readable();
+  const render::FilmValues values = light_group_of(settings, readable(), group);
+  require_floats(rgb, count, values.count());
+  render::FilmReader(functions_).read(values, rgb);
+}
+
+render::FilmValues Context::light_group_of(const DisplaySettings& settings, const render::Picture& picture,
+                                           std::uint32_t group) {
   if (group >= picture.light_groups()) {
     throw Error(ErrorCode::invalid_argument,
                 "the image has " + std::to_string(picture.light_groups()) +
                     " light groups: set cumulet_sampling_desc.light_groups and render at full resolution");
   }
-  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 3;
-  if (rgb == nullptr || count < floats)
-    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
-  render::FilmReader(functions_).read_light_group(picture, group, settings.shown(false).shows_background(), rgb);
+  return render::FilmValues::light_group(picture, group, settings.shown(false).shows_background());
 }
 
 void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_t ranks, float* values,
                           std::size_t count) {
   render::Picture& picture = readable_shaded();
-  const std::size_t floats = std::size_t{picture.size().x} * picture.size().y * 2 * ranks;
-  if (values == nullptr || count < floats)
-    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(floats) + " floats");
+  require_floats(values, count, pixels_of(picture) * 2 * ranks);
   require_present(true);
   render::MatteIds ids;
   MatteObject object;
@@ -274,7 +277,7 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
   if (!is_traced(picture)) {
     throw Error(ErrorCode::unsupported, "only shaded images with path-traced surfaces can be denoised");
   }
-  require_room(picture, rgba, count);
+  require_floats(rgba, count, pixels_of(picture) * 4);
   find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture));
   const render::Display display = shot.display.shown(false);
   const gl::Object denoised =
@@ -290,7 +293,7 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
     const std::size_t to = 4 * ((box.first.y + y) * size.x + box.first.x);
     std::memcpy(rgba + to, &pixels[y * box.size.x], box.size.x * sizeof(glm::vec4));
   }
-  put_before(display, picture, {rgba, std::size_t{size.x} * size.y * 4});
+  backdrop_of(display, picture).put_behind({rgba, pixels_of(picture) * 4});
 }
 
 gl::Object Context::by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network) {
@@ -323,10 +326,51 @@ gl::Object Context::filtered(const render::Picture& picture, bool with_backgroun
 
 void Context::read_linear(const DisplaySettings& settings, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
-  const std::size_t floats = require_room(picture, rgba, count);
+  require_floats(rgba, count, pixels_of(picture) * 4);
   const render::Display display = settings.shown(picture.view() != render::View::shaded);
   read_means(picture, display.shows_background(), rgba);
-  put_before(display, picture, {rgba, floats});
+  backdrop_of(display, picture).put_behind({rgba, pixels_of(picture) * 4});
+}
+
+// ---- without waiting ----
+
+void Context::begin_read(const DisplaySettings& settings, const ReadRequest& request, std::uint64_t number) {
+  render::Picture* picture = progressive_.newest();
+  if (picture == nullptr) throw Error(ErrorCode::invalid_argument, nothing_rendered);
+  if (reads_.size() == max_reads)
+    throw Error(ErrorCode::invalid_argument, std::to_string(max_reads) + " reads are pending: finish or cancel one");
+  const bool shaded = picture->view() == render::View::shaded;
+  if (!shaded && request.source != ReadRequest::Source::linear) throw Error(ErrorCode::invalid_argument, only_shaded);
+  progressive_.tracer().order();
+  std::vector<gl::Object> drawn;
+  Backdrop backdrop;
+  const auto values = [&] {
+    if (request.source == ReadRequest::Source::light_group)
+      return light_group_of(settings, *picture, request.light_group);
+    if (request.source == ReadRequest::Source::aov) {
+      if (render::feature_buffer_of(render::aov_values.at(static_cast<std::size_t>(request.aov)).layer) != nullptr)
+        throw Error(ErrorCode::invalid_argument, "samples do not accumulate this AOV: use cumulet_read_aov");
+      return accumulated_aov(*picture, request.aov, drawn);
+    }
+    const render::Display display = settings.shown(!shaded);
+    backdrop = backdrop_of(display, *picture);
+    return means_of(*picture, display.shows_background(), drawn);
+  };
+  reads_.emplace(number, Read{render::PendingRead(functions_, values()), backdrop});
+}
+
+ReadState Context::finish_read(std::uint64_t number, float* values, std::size_t count) {
+  const auto found = reads_.find(number);
+  if (found == reads_.end()) throw Error(ErrorCode::invalid_argument, "there is no read " + std::to_string(number));
+  const render::PendingRead& pending = found->second.pending;
+  const render::FilmValues& of = pending.values();
+  if (values != nullptr) require_floats(values, count, of.count());
+  const ReadState state{pending.ready(), of.size(), static_cast<std::uint32_t>(of.channels())};
+  if (!state.ready || values == nullptr) return state;
+  pending.take(values);
+  found->second.backdrop.put_behind({values, of.count()});
+  reads_.erase(found);
+  return state;
 }
 
 render::Picture& Context::accumulating() {

@@ -22,9 +22,10 @@ std::optional<Error> failure_of(const SequenceFeed& feed, std::uint32_t frame) {
 }  // namespace
 
 Viewer::Viewer(Log log, std::function<void()> update, bool restore_state, Trace trace, std::shared_ptr<Sharing> sharing)
-    : log_(std::move(log)),
+    : update_(std::move(update)),
+      state_(std::move(log), [this] { update_.call(); }),
+      log_(state_.log()),
       trace_(trace),
-      update_(std::move(update)),
       gl_(log_, restore_state, std::move(sharing)),
       jobs_({.log = log_, .notify = [this] { notify(); }, .trace = trace, .resource_limits = resource_limits_}),
       stage_(jobs_, reported_failures_, *this, resource_limits_, log_) {
@@ -47,7 +48,7 @@ void Viewer::touch() {
 }
 
 bool Viewer::is_displayed(const scene::SequenceFrame& frame, bool is_rendered) const {
-  if (const Context* g = gl_.find()) return is_rendered && !g->has_pending_frame(frame);
+  if (frames_) return is_rendered && !frames_->is_pending(frame);
   return !simulated_gl_ || (is_rendered && simulated_gl_->displays_frames);
 }
 
@@ -55,8 +56,7 @@ bool Viewer::is_displayed(const scene::SequenceFrame& frame, bool is_rendered) c
 
 Viewer::SequenceStatus Viewer::status_of(const SequenceFeed& feed) const {
   // The displayed frame may belong to another sequence.
-  const Context* g = gl_.find();
-  return feed.status(g != nullptr ? feed.find_in(g->shown_frames()) : std::nullopt);
+  return feed.status(frames_ ? feed.find_in(frames_->shown) : std::nullopt);
 }
 
 Viewer::SequenceStatus Viewer::sequence() { return status_of(stage_.volumes.own_sequence()); }
@@ -95,15 +95,22 @@ void Viewer::wait(double timeout_ms) {
   std::optional<std::chrono::steady_clock::time_point> until;
   if (timeout_ms >= 0.0) until = deadline_after(timeout_ms);
   // One result may cause further work.
-  do {
-    // Stopped workers never become idle.
-    if (process_is_ending()) throw Error(ErrorCode::cancelled, "the process is exiting");
-    sync();
-    if (!jobs_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
+  const auto settled = [this] {
+    const StateLock::Held held = hold_state();
     // The newest state is waited for, so it need not wait until the previous one has been displayed.
     stage_.volumes.take_unseen_states();
     sync();
-  } while (busy());
+    return !busy();
+  };
+  {
+    const StateLock::Held held = hold_state();
+    sync();
+  }
+  do {
+    // Stopped workers never become idle.
+    if (process_is_ending()) throw Error(ErrorCode::cancelled, "the process is exiting");
+    if (!jobs_.wait(until)) throw Error(ErrorCode::timeout, "not ready in time");
+  } while (!settled());
   if (const auto failure = reported_failures_.report(jobs_.status().failures, ReportedFailures::Cancelled::reported))
     throw Error(*failure);
 }

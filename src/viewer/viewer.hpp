@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
@@ -20,6 +21,7 @@
 #include "viewer/context.hpp"
 #include "viewer/dynamic_gl_bridge.hpp"
 #include "viewer/settings.hpp"
+#include "viewer/state_lock.hpp"
 #include "viewer/update_callback.hpp"
 
 namespace cumulet::viewer {
@@ -43,8 +45,12 @@ struct Stats {
 };
 
 /// The implementation behind the C ABI: takes settings, renders images. A change causes only the rebuilds that it
-/// requires. Threads, GL context and GL state: see cumulet.h. Functions throw Error; a call that throws leaves the
-/// viewer unchanged.
+/// requires. GL context and GL state: see cumulet.h. Functions throw Error; a call that throws leaves the viewer
+/// unchanged.
+///
+/// Threads: status() and cancel() may be called at any time. Calls that use the context wait for each other, and hold
+/// the state lock only while they take or update the state. For all other calls, except those for tests, the caller
+/// holds the state lock if other threads may call.
 class Viewer final : private StageHost {
  public:
   using GetProc = AttachedContext::GetProc;
@@ -56,9 +62,13 @@ class Viewer final : private StageHost {
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
+  /// Locks what settings and input change. Calls that use the context must not be made under it, nor wait() and
+  /// encode_display().
+  [[nodiscard]] StateLock::Held hold_state() const { return StateLock::Held(state_); }
+
   void attach(GetProc get_proc, void* user);
-  void detach() { gl_.detach(); }
-  void context_lost() { gl_.lose(); }
+  void detach();
+  void context_lost();
   [[nodiscard]] bool attached() const { return gl_.find() != nullptr; }
 
   void load_volume(const VolumeFile& file) { stage_.volumes.load_volume(file); }
@@ -184,6 +194,11 @@ class Viewer final : private StageHost {
   void read_light_group(std::uint32_t group, float* rgb, std::size_t count);
   void read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count);
   void read_linear(float* rgba, std::size_t count);
+  /// Begins to read without waiting; returns the number of the read.
+  std::uint64_t begin_read(const ReadRequest& request);
+  /// values: receives the values if they are ready, which ends the read; null: none.
+  ReadState finish_read(std::uint64_t read, float* values, std::size_t count);
+  void cancel_read(std::uint64_t read);
   void read_display(std::uint8_t* rgba, std::size_t count);
   /// network_file: denoiser weights, which stay in memory; null: use the real-time filter. Throws Error(file) if the
   /// file is invalid.
@@ -201,7 +216,7 @@ class Viewer final : private StageHost {
   Stats stats();
 
   /// Calls the host's update callback. Calls are coalesced. Thread-safe.
-  void notify() override { update_.call(); }
+  void notify() override { state_.notify(); }
 
   /// Returns the shader parameters of the current image; for tests.
   const core::CmParameters& trace_parameters();
@@ -227,6 +242,10 @@ class Viewer final : private StageHost {
   DryRun dry_run(const Frame& frame);
 
  private:
+  // Runs `body` in the context, after the calls of other threads that use it.
+  void in_context(const std::function<void(Context&)>& body);
+  // Updates what other threads know about the context. The caller holds the state lock.
+  void take_frames();
   // True if a worker is busy or has a result that has not been taken.
   [[nodiscard]] bool busy() const { return jobs_.busy() || stage_.volumes.frames_are_due(); }
   void sync() override { stage_.sync(); }
@@ -234,9 +253,17 @@ class Viewer final : private StageHost {
   [[nodiscard]] bool is_displayed(const scene::SequenceFrame& frame, bool is_rendered) const override;
   void track(const std::shared_ptr<Live>& live) override { dynamic_gl_.track(live); }
   [[nodiscard]] SequenceStatus status_of(const SequenceFeed& feed) const;
-  // Prepares a frame before uploads.
+  // Prepares a frame before uploads. The caller holds the state lock.
   void prepare(const Frame& frame);
+  // Takes the state as it is now. The caller holds the state lock.
   [[nodiscard]] Shot shot();
+  // Does so, with the lock.
+  [[nodiscard]] Shot shot_now();
+  [[nodiscard]] DisplaySettings display_now() const;
+  // Prepares a frame and takes its state.
+  void take_state(const Frame& frame, Shot& shot, Context::UploadLimits& limits);
+  // Takes what the frame has displayed, and fills in the flags about pending work.
+  void finish_frame(Context& g, FrameResult& result);
   // Updates the upload progress for status() and stats().
   void follow_upload(const Context& g);
   // Takes the cell counts of GPU-built grids once they are built.
@@ -244,20 +271,24 @@ class Viewer final : private StageHost {
   // Fills in the flags about pending work and failures.
   void report_pending(FrameResult& result);
   // Logs a warning about non-finite samples: once per image, or only once if previews are on.
-  void remark_on_samples(Context& g);
+  void remark_on_samples(Context& g, const Shot& shot);
 
+  UpdateCallback update_;
+  mutable StateLock state_;
+  std::mutex context_mutex_;  // of gl_; locked before state_
   Log log_;
   Trace trace_;
-  UpdateCallback update_;
   mutable ReportedFailures reported_failures_;
   std::atomic<double> upload_progress_ = 1.0;
   Context::UploadLimits upload_limits_{.max_bytes = ResourceLimits::no_limit};
   std::optional<SimulatedGl> simulated_gl_;
+  std::optional<FramesInContext> frames_;  // nullopt: no context
   Sampling sampling_;
   DisplaySettings display_;
   denoise::NetworkCache networks_;
   std::optional<std::uint64_t> remarked_picture_;  // the last image with a warning about its samples
   render::Totals totals_;
+  std::uint64_t last_read_ = 0;  // number of the last begin_read()
   DynamicGlBridge dynamic_gl_{[this] { notify(); }};
   std::shared_ptr<ResourceLimits> resource_limits_ = std::make_shared<ResourceLimits>();
   AttachedContext gl_;

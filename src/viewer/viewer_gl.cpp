@@ -42,12 +42,61 @@ struct Failures {
 
 }  // namespace
 
+// ---- the context ----
+
+void Viewer::take_frames() {
+  const Context* g = gl_.find();
+  frames_ = g != nullptr ? std::optional(g->frames()) : std::nullopt;
+}
+
+void Viewer::in_context(const std::function<void(Context&)>& body) {
+  const std::scoped_lock lock(context_mutex_);
+  const auto ended = [this] {
+    const StateLock::Held held = hold_state();
+    take_frames();
+  };
+  try {
+    gl_.call(body);
+  } catch (...) {
+    ended();
+    throw;
+  }
+  ended();
+}
+
 void Viewer::attach(GetProc get_proc, void* user) {
+  const std::scoped_lock lock(context_mutex_);
   gl_.attach(get_proc, user);
+  const StateLock::Held held = hold_state();
+  take_frames();
   notify();
 }
 
+void Viewer::detach() {
+  const std::scoped_lock lock(context_mutex_);
+  gl_.detach();
+  const StateLock::Held held = hold_state();
+  take_frames();
+}
+
+void Viewer::context_lost() {
+  const std::scoped_lock lock(context_mutex_);
+  gl_.lose();
+  const StateLock::Held held = hold_state();
+  take_frames();
+}
+
 // ---- frames ----
+
+Shot Viewer::shot_now() {
+  const StateLock::Held held = hold_state();
+  return shot();
+}
+
+DisplaySettings Viewer::display_now() const {
+  const StateLock::Held held = hold_state();
+  return display_;
+}
 
 void Viewer::prepare(const Frame& frame) {
   const glm::uvec2 size(static_cast<unsigned>(frame.viewport[2]), static_cast<unsigned>(frame.viewport[3]));
@@ -60,6 +109,7 @@ void Viewer::prepare(const Frame& frame) {
 
 void Viewer::follow_upload(const Context& g) {
   upload_progress_ = g.scene().progress();
+  const StateLock::Held held = hold_state();
   Built& built = stage_.volumes.built();
   if (const auto seconds = g.scene().upload_seconds(built.source)) built.seconds.upload = *seconds;
   take_cells(g);
@@ -82,10 +132,11 @@ void Viewer::take_cells(const Context& g) {
   });
 }
 
-void Viewer::remark_on_samples(Context& g) {
+void Viewer::remark_on_samples(Context& g, const Shot& shot) {
   const render::Picture* picture = g.progressive().newest();
   const std::uint64_t count = picture != nullptr ? picture->samples_not_finite() : 0;
-  if (count == 0 || (remarked_picture_ && (sampling_.options.preview || remarked_picture_ == picture->begun()))) return;
+  if (count == 0 || (remarked_picture_ && (shot.sampling.options.preview || remarked_picture_ == picture->begun())))
+    return;
   remarked_picture_ = picture->begun();
   log_.warning("the radiance of " + std::to_string(count) +
                " samples was not finite; they are black (see nonfinite_samples in the statistics)");
@@ -123,7 +174,7 @@ FrameResult Viewer::render(const Frame& frame) {
   Failures failures;
   // Reset before anything is read, so that later changes notify again.
   update_.reset();
-  gl_.call([&](Context& g) {
+  in_context([&](Context& g) {
     // A failure of one part does not prevent the others. It is thrown once, after drawing.
     const auto attempt = [&](const char* name, auto&& part) {
       const gl::DebugGroup group(*g.functions(), name);
@@ -147,44 +198,82 @@ FrameResult Viewer::render(const Frame& frame) {
     } else {
       DynamicGlBridge::follow_transfers(g, 0.0);
     }
+    Shot shot;
+    Context::UploadLimits limits;
     attempt("cumulet: upload", [&] {
-      prepare(frame);
-      if (frame.budget_ms >= 0.0) g.upload(shot(), upload_limits_, deadline);
+      take_state(frame, shot, limits);
+      if (frame.budget_ms >= 0.0) g.upload(shot, limits, deadline);
     });
-    stage_.volumes.note_rendered();
     follow_upload(g);
-    const Shot shot = this->shot();
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
     attempt("cumulet: surfaces only", [&] { g.draw_surfaces_alone(shot, frame); });
     attempt("cumulet: draw", [&] { g.draw(shot, frame, result); });
     g.report(shot, frame, result);
-    remark_on_samples(g);
-    stage_.volumes.take_gl_bytes(g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes());
+    remark_on_samples(g, shot);
     if (shares && frame.budget_ms > 0.0) g.learn(frame, milliseconds(Clock::now() - begun));
-    stage_.volumes.note_displayed(g.shown_frames());
-    report_pending(result);
-    if (g.transfers().busy() || dynamic_gl_.is_due(g)) {
-      result.more = true;
-      result.converged = false;
-    }
+    finish_frame(g, result);
     if (failures.first && !g.is_news(shot, *failures.first)) failures = {};
   });
   failures.report(log_);
   return result;
 }
 
+void Viewer::take_state(const Frame& frame, Shot& shot, Context::UploadLimits& limits) {
+  const StateLock::Held held = hold_state();
+  limits = upload_limits_;
+  const auto taken = [&] {
+    stage_.volumes.note_rendered();
+    if (frames_) frames_->in_work = true;
+    shot = this->shot();
+  };
+  try {
+    prepare(frame);
+  } catch (...) {
+    taken();  // the parts that did not fail are drawn
+    throw;
+  }
+  taken();
+}
+
+void Viewer::finish_frame(Context& g, FrameResult& result) {
+  const std::uint64_t beside_volumes = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
+  const bool gl_due = g.transfers().busy() || dynamic_gl_.is_due(g);
+  const StateLock::Held held = hold_state();
+  take_frames();
+  stage_.volumes.take_gl_bytes(beside_volumes);
+  stage_.volumes.note_displayed(frames_->shown);
+  report_pending(result);
+  if (gl_due) {
+    result.more = true;
+    result.converged = false;
+  }
+}
+
 WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   WarmUp result;
   const render::Deadline deadline = deadline_after(frame.budget_ms);
-  gl_.call([&](Context& g) {
+  in_context([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
     dynamic_gl_.update(g);
     DynamicGlBridge::follow_transfers(g, frame.budget_ms);
-    prepare(frame);
-    g.upload(shot(), upload_limits_, deadline);
+    Shot shot;
+    Context::UploadLimits limits;
+    bool waits = false;
+    {
+      const StateLock::Held held = hold_state();
+      prepare(frame);
+      if (frames_) frames_->in_work = true;
+      shot = this->shot();
+      limits = upload_limits_;
+    }
+    g.upload(shot, limits, deadline);
     follow_upload(g);
-    result = g.warm_up(shot(), frame, all, busy(), deadline);
+    {
+      const StateLock::Held held = hold_state();
+      waits = busy();
+    }
+    result = g.warm_up(shot, frame, all, waits, deadline);
   });
   return result;
 }
@@ -192,7 +281,7 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
 // live: by value, because the log callback may release the host's last handle.
 void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& state) {
   const std::vector<volume::Channel> channels = DynamicGlBridge::check(state);
-  gl_.call([&](Context& g) { dynamic_gl_.submit(g, live, state, channels); });
+  in_context([&](Context& g) { dynamic_gl_.submit(g, live, state, channels); });
   notify();
 }
 
@@ -201,63 +290,87 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
 MapResult Viewer::update_map(const MapRequest& request) {
   MapResult result;
   const render::Deadline deadline = deadline_after(request.budget_ms);
-  gl_.call([&](Context& g) {
+  in_context([&](Context& g) {
     const gl::DebugGroup group(*g.functions(), "cumulet: transmittance map");
     const Trace::Span span(trace_, "cumulet: transmittance map");
-    result = g.update_map(shot(), request, deadline);
+    result = g.update_map(shot_now(), request, deadline);
+    const StateLock::Held held = hold_state();
+    result.more = result.more || g.scene().uploading_volumes() || busy();
   });
-  result.more = result.more || gl_.get().scene().uploading_volumes() || busy();
   return result;
 }
 
 void Viewer::drop_map(std::uint32_t slot) {
-  gl_.call([&](Context& g) { g.drop_map(slot); });
+  in_context([&](Context& g) { g.drop_map(slot); });
 }
 
 // ---- read-back ----
 
 Pick Viewer::pick(double x, double y) {
   Pick pick;
-  gl_.call([&](Context& g) { pick = g.pick(shot(), x, y); });
+  in_context([&](Context& g) { pick = g.pick(shot_now(), x, y); });
+  const StateLock::Held held = hold_state();
   pick.tag = stage_.tag_of(pick.volume != 0 ? pick.volume : pick.model);
   return pick;
 }
 
 void Viewer::read_mattes(const MatteIdOf& id_of, std::uint32_t ranks, float* values, std::size_t count) {
   const auto of_tagged = [&](MatteObject object) {
-    // The empty volume for surfaces has no matte.
-    if (object.kind == MatteObject::Kind::volume && object.id == 0 && !stage_.volumes.shown_info()) return 0U;
-    object.tag = stage_.tag_of(object.id);
+    {
+      const StateLock::Held held = hold_state();
+      // The empty volume for surfaces has no matte.
+      if (object.kind == MatteObject::Kind::volume && object.id == 0 && !stage_.volumes.shown_info()) return 0U;
+      object.tag = stage_.tag_of(object.id);
+    }
     return id_of(object);
   };
-  gl_.call([&](Context& g) { g.read_mattes(shot(), of_tagged, ranks, values, count); });
+  in_context([&](Context& g) { g.read_mattes(shot_now(), of_tagged, ranks, values, count); });
 }
 
 void Viewer::read_aov(Aov aov, float* values, std::size_t count) {
-  gl_.call([&](Context& g) { g.read_aov(shot(), aov, values, count); });
+  in_context([&](Context& g) { g.read_aov(shot_now(), aov, values, count); });
 }
 
 void Viewer::read_light_group(std::uint32_t group, float* rgb, std::size_t count) {
-  gl_.call([&](Context& g) { g.read_light_group(display_, group, rgb, count); });
+  in_context([&](Context& g) { g.read_light_group(display_now(), group, rgb, count); });
+}
+
+std::uint64_t Viewer::begin_read(const ReadRequest& request) {
+  std::uint64_t number = 0;
+  in_context([&](Context& g) {
+    number = ++last_read_;
+    g.begin_read(display_now(), request, number);
+  });
+  return number;
+}
+
+ReadState Viewer::finish_read(std::uint64_t read, float* values, std::size_t count) {
+  ReadState state;
+  in_context([&](Context& g) { state = g.finish_read(read, values, count); });
+  return state;
+}
+
+void Viewer::cancel_read(std::uint64_t read) {
+  in_context([&](Context& g) { g.cancel_read(read); });
 }
 
 void Viewer::read_linear(float* rgba, std::size_t count) {
-  gl_.call([&](Context& g) {
-    g.read_linear(display_, rgba, count);
+  in_context([&](Context& g) {
+    g.read_linear(display_now(), rgba, count);
     totals_ = g.totals();
   });
 }
 
 void Viewer::read_denoised(const char* network_file, float* rgba, std::size_t count) {
-  gl_.call([&](Context& g) {
+  in_context([&](Context& g) {
     const denoise::NetworkPtr network = network_file != nullptr ? networks_.get(network_file) : nullptr;
-    g.read_denoised(shot(), network, rgba, count);
+    g.read_denoised(shot_now(), network, rgba, count);
     totals_ = g.totals();
   });
 }
 
 void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const {
-  render::to_display(linear, display_.shown(false), rgba);
+  render::to_display(linear, display_now().shown(false), rgba);
 }
 
 void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
@@ -266,13 +379,14 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
   render::PixelBox box;
   bool legend = false;
   bool filtered = false;
-  gl_.call([&](Context& g) {
+  const DisplaySettings display = display_now();
+  in_context([&](Context& g) {
     const render::Picture& picture = g.readable();
     width = picture.size().x;
     box = picture.box();
     pixels = std::size_t{picture.size().x} * picture.size().y;
     legend = picture.view() != render::View::shaded;
-    filtered = display_.denoise && g.can_denoise(picture);
+    filtered = display.denoise && g.can_denoise(picture);
   });
   if (rgba == nullptr || count < pixels * 4)
     throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(pixels * 4) + " bytes");
@@ -282,34 +396,40 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
   } else {
     read_linear(linear.data(), linear.size());
   }
-  render::to_display(linear, display_.shown(legend), {rgba, pixels * 4});
+  render::to_display(linear, display.shown(legend), {rgba, pixels * 4});
   for (std::size_t i = 0; i < pixels; ++i) {
     if (!box.holds({i % width, i / width})) std::fill_n(rgba + 4 * i, 4, std::uint8_t{0});
   }
 }
 
 std::optional<double> Viewer::measure_noise() {
-  gl_.call([&](Context& g) { totals_ = g.totals(); });
-  return totals_.noise;
+  std::optional<double> noise;
+  in_context([&](Context& g) {
+    totals_ = g.totals();
+    noise = totals_.noise;
+  });
+  return noise;
 }
 
 std::size_t Viewer::accumulation_bytes() {
   std::size_t bytes = 0;
-  gl_.call([&](Context& g) { bytes = g.accumulation_bytes(); });
+  in_context([&](Context& g) { bytes = g.accumulation_bytes(); });
   return bytes;
 }
 
 void Viewer::read_accumulation(std::span<std::byte> bytes) {
-  gl_.call([&](Context& g) { g.read_accumulation(bytes); });
+  in_context([&](Context& g) { g.read_accumulation(bytes); });
 }
 
 void Viewer::restore_accumulation(std::span<const std::byte> bytes) {
-  gl_.call([&](Context& g) { g.restore_accumulation(bytes); });
+  in_context([&](Context& g) { g.restore_accumulation(bytes); });
 }
 
 const core::CmParameters& Viewer::trace_parameters() { return gl_.get().readable().parameters(); }
 
 Stats Viewer::stats() {
+  const std::scoped_lock lock(context_mutex_);
+  const StateLock::Held held = hold_state();
   sync();
   Stats s;
   GridTotals totals = stage_.volumes.totals();

@@ -50,6 +50,29 @@ class StateScramble : public GlTest {
   }
 };
 
+TEST_P(StateScramble, ReadsWithoutWaitingRestoreTheState) {
+  ScramblingHost host(gl_, legacy_);
+  const HostTarget target(*gl_, side, side);
+  const auto ball = cumulet::test::make_ball(12);
+  const ViewerPtr viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = context_.get()});
+  cumulet_viewer* v = viewer.get();
+  ASSERT_EQ(cumulet_set_volume(v, ball.get()), CUMULET_OK);
+  converge(v, target.frame());
+  auto desc = make_desc<cumulet_read_desc>();
+  std::vector<float> values(std::size_t{4} * side * side);
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    desc.source = seed % 2 == 0 ? CUMULET_READ_LINEAR : CUMULET_READ_AOV;
+    auto info = make_desc<cumulet_read_info>();
+    std::uint64_t read = 0;
+    expect_kept(host, seed, "begin_read", [&] { return cumulet_begin_read(v, &desc, &read); });
+    while (info.ready == 0 && !HasFailure()) {
+      expect_kept(host, seed, "finish_read",
+                  [&] { return cumulet_finish_read(v, read, values.data(), values.size(), &info); });
+    }
+    expect_kept(host, seed, "cancel_read", [&] { return cumulet_cancel_read(v, read); });
+  }
+}
+
 TEST_P(StateScramble, EveryCallRestoresTheState) {
   ScramblingHost host(gl_, legacy_);
   const HostTarget target(*gl_, side, side);

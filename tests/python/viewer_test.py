@@ -94,6 +94,14 @@ class Pictures(unittest.TestCase):
         self.assertEqual(bits, cumulet.cryptomatte_id("volume"))
         with self.assertRaisesRegex(cumulet.Error, "light"):
             self.viewer.read_light_group(0)
+        read = self.viewer.begin_read(source="linear")
+        values = None
+        while values is None:
+            values = self.viewer.finish_read(read)
+        self.assertEqual(values, self.viewer.read_linear())
+        with self.assertRaisesRegex(cumulet.Error, f"there is no read {read}"):
+            self.viewer.finish_read(read)
+        self.viewer.cancel_read(self.viewer.begin_read(source="aov", aov="error"))
         samples = self.viewer.read_accumulation()
         self.viewer.restore_accumulation(samples)
         with self.assertRaises(cumulet.Error):
@@ -125,6 +133,26 @@ class Pictures(unittest.TestCase):
         thread.join()
         self.assertEqual(failures, [])
         self.viewer.read_display()
+
+    def test_settings_do_not_wait_for_frames(self):
+        viewer = viewer_of_box(trace=lambda name, begin, end: during(name))
+        done = threading.Event()
+        frames = []
+
+        def set_medium():
+            viewer.set_medium(density_scale=2.0)
+            viewer.get_volume()
+            done.set()
+
+        def during(name):
+            if name == "cumulet: trace" and not frames:
+                thread = threading.Thread(target=set_medium)
+                thread.start()
+                frames.append(done.wait(30.0))  # inside the frame
+
+        viewer.render(width=8, height=8, budget_ms=1, target="none")
+        self.assertEqual(frames, [True])
+        viewer.close()
 
     def test_updates_were_announced(self):
         self.assertTrue(self.updates)

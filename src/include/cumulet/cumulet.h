@@ -36,13 +36,16 @@
  *
  * @section cumulet_threads Threads
  *
- * - Calls for one viewer must not overlap, on any threads. Two functions are exempt and may be called on any thread at
- *   any time: cumulet_cancel and cumulet_get_progress.
+ * - Any function may be called on any thread at any time, with any handle, except that no call for a viewer may overlap
+ *   with its cumulet_destroy. The host needs no lock of its own.
  * - Functions marked [GL] need the attached context, or a context that shares objects with it, current on the calling
  *   thread. Otherwise each call returns CUMULET_ERROR_GL and changes nothing; the next call with the context current
- *   works again. No other function uses GL.
- * - Functions of camera, volume, sequence, dynamic volume, surfaces, model, instance, environment and shader cache
- *   handles may be called on any thread at any time.
+ *   works again. No other function uses GL. [GL] calls for one viewer wait for each other.
+ * - All other functions (settings, loads, input, queries) do not wait for frames. While another thread is in
+ *   cumulet_render, they take effect at once, and the next frame shows it. The running frame shows the state that it
+ *   found. There are three exceptions: cumulet_get_stats, cumulet_attach and cumulet_context_lost wait for running [GL]
+ *   calls, and cumulet_wait waits for workers.
+ * - Each call is complete in itself. Two threads that read, change and set the same settings need a lock of their own.
  * - The viewer's worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render
  *   uploads the results within its time budget, and shows the last complete image until then.
  * - Requests are coalesced: each kind of work has at most one running and one queued request, and a new request
@@ -57,11 +60,13 @@
  *   that retain or release handles, cumulet_status_text, cumulet_version, cumulet_cryptomatte_id, cumulet_region_pixels
  *   and cumulet_transmittance_map_glsl. Other calls inside a callback, for any viewer or handle, return
  *   CUMULET_ERROR_INVALID_ARGUMENT; cumulet_destroy does nothing.
- * - Callbacks may be called while [GL] calls of other viewers with the same shader cache wait for their turn. Take no
- *   lock in a callback that is also held around a [GL] call.
+ * - Take no lock in a callback that is also held around calls of the library, because other calls may wait for the
+ *   callback: [GL] calls of viewers with the same shader cache, calls for the same viewer or handle, and calls that
+ *   replace content.
+ * - Log lines and notifications of a call that changes settings come at its end, when other threads may already make
+ *   calls.
  * - A call that changes a camera, an instance, a model, a sequence or a dynamic volume runs the update callbacks of all
- *   viewers that show it. Other calls for that handle wait meanwhile. Take no lock in a callback that is also held
- *   around calls for such handles.
+ *   viewers that show it.
  *
  * @section cumulet_process_end End of the process
  *
@@ -145,9 +150,9 @@
  *
  * @section cumulet_errors Errors
  *
- * - Every function that can fail returns a cumulet_status. After a call with a viewer, cumulet_last_error returns one
- *   line that names the cause, and the file if there is one. Functions without a viewer write that line into the
- *   caller's error buffer, if they have one.
+ * - Every function that can fail returns a cumulet_status. After a call with a viewer, cumulet_last_error returns, on
+ *   the same thread, one line that names the cause, and the file if there is one. Functions without a viewer write
+ *   that line into the caller's error buffer, if they have one.
  * - A call that fails leaves the viewer as it was, and the viewer still draws what it drew before. No C++ exception
  *   leaves the library.
  * - Every function returns CUMULET_ERROR_INVALID_ARGUMENT for a NULL handle, a NULL pointer that is not documented as
@@ -429,18 +434,20 @@ CUMULET_API cumulet_status cumulet_create(const cumulet_create_desc* desc, cumul
  * the freeing of gigabytes. It ends on threads of the library that may outlive the viewer by about a second. These
  * threads call no callback and use no GL, handle or file. dlclose and exit() wait for them.
  *
- * Threads: one call per viewer at a time; not inside a callback, where it does nothing.
+ * Threads: any thread, after all other calls for the viewer; not inside a callback, where it does nothing.
  *
  * @param viewer May be NULL.
  */
 CUMULET_API void cumulet_destroy(cumulet_viewer* viewer);
 /**
- * Returns why the last call for this viewer failed, in one line.
+ * Returns why the last call of this thread for this viewer failed, in one line. cumulet_get_progress and cumulet_cancel
+ * do not change it.
  *
- * Threads: one call per viewer at a time. No GL. cumulet_get_progress and cumulet_cancel do not change it.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer; NULL gives "viewer is NULL".
- * @return The line; "" if the last call succeeded. Valid until the next call for this viewer.
+ * @return The line; "" if that call succeeded, or if there was none. Valid until the next call of this thread for this
+ *         viewer.
  */
 CUMULET_API const char* cumulet_last_error(const cumulet_viewer* viewer);
 
@@ -448,7 +455,7 @@ CUMULET_API const char* cumulet_last_error(const cumulet_viewer* viewer);
  * [GL] Attaches a detached viewer to the current context, with the checks of cumulet_create. The next frames create its
  * GL objects.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer        A detached viewer.
  * @param get_proc      Loads GL functions; called only during this call.
@@ -460,7 +467,7 @@ CUMULET_API cumulet_status cumulet_attach(cumulet_viewer* viewer, cumulet_get_pr
 /**
  * [GL] Deletes the viewer's GL objects and detaches it. Does nothing if it is detached already.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer The viewer.
  * @return CUMULET_OK, or CUMULET_ERROR_GL if the attached context is not current; the viewer then stays attached.
@@ -470,7 +477,7 @@ CUMULET_API cumulet_status cumulet_detach(cumulet_viewer* viewer);
  * Detaches a viewer without any GL call, because its context and all objects in it are gone. Does nothing if it is
  * detached already.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread; waits for running [GL] calls. No GL.
  *
  * @param viewer The viewer.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
@@ -1646,7 +1653,7 @@ CUMULET_API cumulet_status cumulet_environment_get_pixels(const cumulet_environm
  * displayed. While previews are on, a low-resolution proxy of a large .vdb file (50,000 bricks of 8^3 and more) is
  * displayed first. docs/howto/loading.md has the rules of loading and of the proxy.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer    The viewer.
  * @param path      UTF-8 path of a .vdb or .nvdb file.
@@ -1659,7 +1666,7 @@ CUMULET_API cumulet_status cumulet_load_volume(cumulet_viewer* viewer, const cha
  * Loads the grids that a descriptor names from a volume file, on the viewer's worker, with the rules of
  * cumulet_load_volume.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The file, its grids and its transform.
@@ -1671,7 +1678,7 @@ CUMULET_API cumulet_status cumulet_load_volume_file(cumulet_viewer* viewer, cons
  * Shows a volume: builds its grid on the worker, and displays it when it is ready. A running build is finished and
  * displayed first. A running load is cancelled. A sequence or dynamic volume is no longer shown.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param volume The volume, which is retained. NULL: no volume, at once.
@@ -1691,7 +1698,7 @@ CUMULET_API cumulet_status cumulet_set_volume(cumulet_viewer* viewer, cumulet_vo
  * - If more than four volumes overlap at one point, images are correct, but results without samples (AOVs, picks, debug
  *   views, a denoiser's guides) may leave some of them out.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param to_world count matrices from the volume's own world space to the scene's. A matrix of zeros is the identity.
@@ -1711,7 +1718,7 @@ CUMULET_API cumulet_status cumulet_set_volume_transforms(cumulet_viewer* viewer,
  * While an instance transform, an instance or a model moves, the tables of all of them take three times the memory, and
  * drivers support a third as many.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param open   count matrices at shutter open. NULL, or a matrix of zeros: the transform at the frame time.
@@ -1735,7 +1742,7 @@ CUMULET_API cumulet_status cumulet_set_volume_shutter_transforms(cumulet_viewer*
  *
  * docs/howto/sequences.md has the rules of reading ahead, waiting, cancelling and failures.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param sequence The sequence, which is retained. NULL: no sequence; if one was shown, nothing is shown.
@@ -1763,7 +1770,7 @@ typedef struct cumulet_sequence_info {
 /**
  * Returns the state of the viewer's sequence, and of each of its frames.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param info   Receives the state; its struct_size must be set.
@@ -1782,7 +1789,7 @@ typedef enum cumulet_frame_state {
 /**
  * Returns why a frame of the viewer's sequence failed.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param frame  The frame, from 0.
@@ -1806,7 +1813,7 @@ CUMULET_API cumulet_status cumulet_get_sequence_frame(cumulet_viewer* viewer, ui
  * - cumulet_stats has the build times of the last state; build_seconds_load is its reading.
  * - cumulet_set_volume, cumulet_set_sequence and a successful cumulet_load_volume end the dynamic volume.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param volume The dynamic volume, which is retained. NULL: none; if one was shown, nothing is shown.
@@ -1898,7 +1905,7 @@ typedef struct cumulet_gl_volume_desc {
  * docs/howto/dynamic_volumes.md has the order of states, the cases in which they are dropped, and GPU residency
  * (cumulet_dynamic_volume_desc.gpu_resident).
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param volume The dynamic volume.
@@ -1919,7 +1926,7 @@ CUMULET_API cumulet_status cumulet_dynamic_volume_set_gl(cumulet_viewer* viewer,
 /**
  * Returns the update numbers of the viewer's dynamic volume.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param info   Receives the numbers; its struct_size must be set.
@@ -1931,7 +1938,7 @@ CUMULET_API cumulet_status cumulet_get_dynamic_volume_info(cumulet_viewer* viewe
  * Returns the volume that was last loaded or set. For a sequence it is the frame taken last, or NULL if its voxels are
  * not kept. For a dynamic volume it is the state taken last, or NULL if its voxels are only in GL memory.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param out    Receives the volume, which the caller releases; NULL if there is none.
@@ -1953,7 +1960,7 @@ CUMULET_API void cumulet_cancel(cumulet_viewer* viewer);
  * ready, and for good if the load fails. A load cancels the running load or pose, but not twice in a row. Surfaces and
  * volume share one world space and one image: rays end at triangles, and light travels both ways.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param path   UTF-8 path of a .gltf or .glb file.
@@ -1965,7 +1972,7 @@ CUMULET_API cumulet_status cumulet_load_surfaces(cumulet_viewer* viewer, const c
  * Shows surfaces: poses them on a worker, and displays them when they are ready. A running pose is finished and
  * displayed first. A running load is cancelled.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param surfaces The surfaces, which are retained. NULL: none, at once.
@@ -1975,7 +1982,7 @@ CUMULET_API cumulet_status cumulet_set_surfaces(cumulet_viewer* viewer, cumulet_
 /**
  * Returns the surfaces that were last loaded or set.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param out    Receives the surfaces, which the caller releases; NULL if there are none.
@@ -1987,7 +1994,7 @@ CUMULET_API cumulet_status cumulet_get_surfaces(cumulet_viewer* viewer, cumulet_
  * Loads an environment file on a worker. Returns at once. The previous environment or sky stays until the new one is
  * ready, and for good if the load fails. A load cancels the running load, but not twice in a row.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param path   UTF-8 path of a .hdr or .exr file, with the rules of cumulet_environment_open.
@@ -2003,7 +2010,7 @@ CUMULET_API cumulet_status cumulet_load_environment(cumulet_viewer* viewer, cons
  * physical sky, without shadows and from a prefiltered map. Diffuse surfaces are accurate to a few per cent; mirrors
  * look blurred.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer      The viewer.
  * @param environment The environment, which is retained. NULL: the sky again.
@@ -2013,7 +2020,7 @@ CUMULET_API cumulet_status cumulet_set_environment(cumulet_viewer* viewer, cumul
 /**
  * Returns the environment that was last loaded or set.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param out    Receives the environment, which the caller releases; NULL if there is none.
@@ -2063,7 +2070,7 @@ typedef struct cumulet_surface_settings_desc {
  * Sets how the viewer shows its own surfaces. If time, animation, double_sided or variant changed, they are posed again
  * on a worker, and the last pose is shown until then.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The settings.
@@ -2075,7 +2082,7 @@ CUMULET_API cumulet_status cumulet_set_surface_settings(cumulet_viewer* viewer,
  * Moves the viewer's camera to a camera of the viewer's own surfaces, as it was posed last. Call cumulet_wait first if
  * the surfaces may still be loading.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param index  The camera, from 0.
@@ -2122,7 +2129,7 @@ CUMULET_API cumulet_status cumulet_get_progress(cumulet_viewer* viewer, cumulet_
  * Waits until all workers of the viewer are idle, and returns how loads and builds ended: the same as
  * cumulet_progress.status, with its message as the last error. The next cumulet_render uploads the results.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread; other threads may make calls meanwhile. No GL.
  *
  * @param viewer     The viewer.
  * @param timeout_ms Maximum time in milliseconds; negative: no maximum.
@@ -2133,7 +2140,7 @@ CUMULET_API cumulet_status cumulet_wait(cumulet_viewer* viewer, double timeout_m
 /**
  * Builds all grids again even if no setting changed, reads all files of sequences again, and retries failed work.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
@@ -2175,7 +2182,7 @@ typedef struct cumulet_limits_desc {
  * Sets the limits of a viewer. They apply to work started after this call. Exception: the grid of a static volume (not
  * of a sequence or dynamic volume) is rebuilt for new memory limits.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The limits.
@@ -2552,7 +2559,7 @@ typedef struct cumulet_display_desc {
 /**
  * Sets how grids are built. A change rebuilds them in the background.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The settings.
@@ -2562,7 +2569,7 @@ CUMULET_API cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumule
 /**
  * Sets the medium of the viewer's own volume.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The medium.
@@ -2587,7 +2594,7 @@ CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumu
  *
  * Properties of a volume ignore ramps: cumulet_volume_info, the suggested density scale, and camera fitting.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param ramp   The grid.
@@ -2736,7 +2743,7 @@ CUMULET_API cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance,
 /**
  * Shows an instance in a viewer, and follows its changes.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param instance The instance, which is retained.
@@ -2746,7 +2753,7 @@ CUMULET_API cumulet_status cumulet_add_instance(cumulet_viewer* viewer, cumulet_
 /**
  * Stops showing an instance in a viewer.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param instance The instance.
@@ -2756,7 +2763,7 @@ CUMULET_API cumulet_status cumulet_remove_instance(cumulet_viewer* viewer, cumul
 /**
  * Returns the state of an instance's sequence in a viewer. Ready frames are those of all instances that share it.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param instance The instance.
@@ -2772,7 +2779,7 @@ CUMULET_API cumulet_status cumulet_get_instance_sequence_info(cumulet_viewer* vi
 /**
  * Returns why a frame of an instance's sequence failed.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param instance The instance.
@@ -2787,7 +2794,7 @@ CUMULET_API cumulet_status cumulet_get_instance_sequence_frame(cumulet_viewer* v
 /**
  * Returns the update numbers of an instance's dynamic volume in a viewer.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param instance The instance.
@@ -2895,7 +2902,7 @@ CUMULET_API cumulet_status cumulet_model_set_time(cumulet_model* model, double t
 /**
  * Shows a model in a viewer, and follows its changes.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param model  The model, which is retained.
@@ -2905,7 +2912,7 @@ CUMULET_API cumulet_status cumulet_add_model(cumulet_viewer* viewer, cumulet_mod
 /**
  * Stops showing a model in a viewer.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param model  The model.
@@ -2923,7 +2930,7 @@ CUMULET_API cumulet_status cumulet_remove_model(cumulet_viewer* viewer, cumulet_
 /**
  * Sets the sun and the sky.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The light.
@@ -2933,7 +2940,7 @@ CUMULET_API cumulet_status cumulet_set_sun_sky(cumulet_viewer* viewer, const cum
 /**
  * Sets the rotation and strength of the viewer's environment.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The settings.
@@ -2944,7 +2951,7 @@ CUMULET_API cumulet_status cumulet_set_environment_settings(cumulet_viewer* view
 /**
  * Sets the ground plane.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The ground.
@@ -2991,7 +2998,7 @@ typedef struct cumulet_light_desc {
  * previews, and with CUMULET_SURFACE_LIGHTING_RASTERIZED) are lit without shadows, and from the centers of disks and
  * rectangles. Restarts accumulation.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param lights The lights, which are copied. May be NULL if count is 0.
@@ -3003,7 +3010,7 @@ CUMULET_API cumulet_status cumulet_set_lights(cumulet_viewer* viewer, const cumu
 /**
  * Sets how images are sampled.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The settings.
@@ -3027,7 +3034,7 @@ CUMULET_API cumulet_status cumulet_region_pixels(const float region[4], uint32_t
 /**
  * Sets how images are displayed.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The settings.
@@ -3072,7 +3079,7 @@ typedef struct cumulet_display_lut_desc {
  *   transparent pixels get color.
  * - It takes 16 bytes per lattice point of GL memory.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The LUT, which is copied. NULL: none.
@@ -3156,7 +3163,7 @@ CUMULET_API void cumulet_camera_release(cumulet_camera* camera);
 /**
  * Sets the camera of a viewer.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param camera The camera, which the viewer keeps alive.
@@ -3166,7 +3173,7 @@ CUMULET_API cumulet_status cumulet_set_camera(cumulet_viewer* viewer, cumulet_ca
 /**
  * Returns the camera of a viewer.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param out    Receives a new handle of the camera, which the caller releases.
@@ -3180,7 +3187,7 @@ CUMULET_API cumulet_status cumulet_get_camera(cumulet_viewer* viewer, cumulet_ca
  * Each frame, the host sets here the camera that it used as the present one in the frame before; it does the same with
  * the other ..._previous functions. An object without previous state has not moved. A change restarts accumulation.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer  The viewer.
  * @param camera  The previous camera, kept alive; its changes are followed. NULL: the camera has not moved.
@@ -3193,7 +3200,7 @@ CUMULET_API cumulet_status cumulet_set_previous_camera(cumulet_viewer* viewer, c
  * Sets the instance transforms of the viewer's volume (cumulet_set_volume_transforms) in the previous frame, for motion
  * vectors.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer   The viewer.
  * @param to_world count matrices, for the first count transforms; the others have not moved.
@@ -3376,7 +3383,7 @@ CUMULET_API cumulet_status cumulet_camera_frame(cumulet_camera* camera, const do
  * Moves the viewer's camera so that it fits the visible volume and triangles, with the margin that cumulet_camera_desc
  * describes. The view direction does not change. Takes some milliseconds.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
@@ -3408,7 +3415,7 @@ typedef struct cumulet_navigation_desc {
 /**
  * Sets how cumulet_input moves the viewer's camera.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer.
  * @param desc   The settings.
@@ -3465,7 +3472,7 @@ typedef struct cumulet_event {
 /**
  * Passes one input event to the viewer, which may move its camera.
  *
- * Threads: one call per viewer at a time; runs update callbacks of viewers that use the camera. No GL.
+ * Threads: any thread; runs update callbacks of viewers that use the camera. No GL.
  *
  * @param viewer  The viewer.
  * @param event   The event.
@@ -3619,7 +3626,7 @@ typedef struct cumulet_frame_result {
  *   host's drawing into a depth texture that the frame names.
  * - Functions that read back wait for the dispatches in flight.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param frame  The frame.
@@ -3670,7 +3677,7 @@ typedef struct cumulet_warm_up_result {
  * - A failed call ends the warm-up, and the next one starts again. A failed load ends it with incomplete 0.
  * - Programs of other viewers (cumulet_shader_cache) and binaries in a folder are not compiled again.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param frame  A frame like the later ones; its budget_ms must not be negative.
@@ -3745,7 +3752,7 @@ typedef struct cumulet_transmittance_map {
  * - It takes 2 bytes per texel, twice that while one is computed (256 x 256 x 32: 4 MiB), counted in
  *   cumulet_stats.gl_bytes.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param desc   The request.
@@ -3758,7 +3765,7 @@ CUMULET_API cumulet_status cumulet_update_transmittance_map(cumulet_viewer* view
 /**
  * [GL] Deletes a transmittance map. Does nothing if there is none in the slot.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param slot   The map, 0 to 15.
@@ -3811,7 +3818,7 @@ typedef struct cumulet_pick {
 /**
  * [GL] Returns the point of the scene under a pixel.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param x      Position from the left, in pixels of the last frame.
@@ -3823,7 +3830,7 @@ CUMULET_API cumulet_status cumulet_pick_at(cumulet_viewer* viewer, double x, dou
 /**
  * Returns the world-space bounding box of the viewer's volume, its instances, surfaces and models.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer  The viewer.
  * @param box_min Receives the lowest corner.
@@ -3837,7 +3844,7 @@ CUMULET_API cumulet_status cumulet_get_bounds(cumulet_viewer* viewer, double box
  * alpha, the part of a pixel that is not background. A pixel without samples is 0; with a background color it has that
  * color.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param rgba   Receives width x height x 4 floats, first pixel top left.
@@ -3852,7 +3859,7 @@ CUMULET_API cumulet_status cumulet_read_linear(cumulet_viewer* viewer, float* rg
  * Alpha is straight, as in PNG. Light that is brighter than its alpha, as of flames, has no straight color, so alpha is
  * raised until the color fits. Over black such a pixel is correct; a background behind it shows less than it should.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param rgba   Receives width x height x 4 bytes, first pixel top left.
@@ -3864,7 +3871,7 @@ CUMULET_API cumulet_status cumulet_read_display(cumulet_viewer* viewer, uint8_t*
  * Converts linear values of any image in the shaded view, as cumulet_read_linear and cumulet_read_denoised return them,
  * to the bytes of cumulet_read_display.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread. No GL.
  *
  * @param viewer The viewer, for its display settings.
  * @param linear count floats.
@@ -3898,7 +3905,7 @@ typedef struct cumulet_denoise_desc {
  * - Both first trace feature rays, three of which take about as long as a sample: 16 per pixel, and up to two per
  *   sample, 64 at most, where they differ.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param desc   The network file.
@@ -3969,7 +3976,7 @@ typedef enum cumulet_aov {
  * through the pixel's center. They have no noise, except where surfaces cover or transmit partially, which is decided
  * at random. Further requests only cost the readback.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param aov    The AOV.
@@ -3985,7 +3992,7 @@ CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov 
  * groups is the radiance of cumulet_read_linear, except for rounding and a background color. Rasterized surfaces
  * (CUMULET_SURFACE_LIGHTING_RASTERIZED) count in group 0. Previews have no light groups.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param group  The group, below cumulet_sampling_desc.light_groups.
@@ -3995,6 +4002,83 @@ CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov 
  *         count is too small; or a [GL] error.
  */
 CUMULET_API cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count);
+
+/** What cumulet_begin_read copies. */
+typedef enum cumulet_read_source {
+  CUMULET_READ_LINEAR = 0, /**< The values of cumulet_read_linear, 4 floats a pixel. */
+  /**
+   * The values of cumulet_read_aov for cumulet_read_desc.aov, which must be one that samples accumulate:
+   * CUMULET_AOV_BEAUTY or CUMULET_AOV_VOLUME, 4 floats, or CUMULET_AOV_ERROR, 1 float.
+   */
+  CUMULET_READ_AOV = 1,
+  CUMULET_READ_LIGHT_GROUP =
+      2 /**< The values of cumulet_read_light_group for cumulet_read_desc.light_group, 3 floats. */
+} cumulet_read_source;
+
+/** A request for read-back without waiting. */
+typedef struct cumulet_read_desc {
+  size_t struct_size;
+  cumulet_read_source source;
+  cumulet_aov aov;      /**< For CUMULET_READ_AOV. */
+  uint32_t light_group; /**< For CUMULET_READ_LIGHT_GROUP. */
+} cumulet_read_desc;
+
+/** The state of a read. */
+typedef struct cumulet_read_info {
+  size_t struct_size;
+  int32_t ready;  /**< 1: the GPU has copied the values. */
+  uint32_t width; /**< Of the image at the time of cumulet_begin_read. */
+  uint32_t height;
+  uint32_t channels; /**< Floats per pixel. */
+} cumulet_read_info;
+
+/**
+ * [GL] Begins to read the image back without waiting for the GPU: queues a copy into a pixel pack buffer, and a fence.
+ * cumulet_finish_read returns the values once the fence has passed, usually one or two frames later.
+ *
+ * - The values are those of the image at this call, with the display settings of this call. Later frames, settings and
+ *   content do not change them. Of a sample that is still being traced, some pixels may have their value already.
+ * - Display values: pass those of CUMULET_READ_LINEAR to cumulet_encode_display, on any thread.
+ * - At most 16 reads may be begun and not finished. Each holds 24 to 48 bytes per pixel (more for light groups) of GL
+ *   memory, counted in cumulet_stats.gl_bytes. Detaching and the loss of the context end all reads.
+ *
+ * Threads: any thread with the context.
+ *
+ * @param viewer An attached viewer.
+ * @param desc   What to read.
+ * @param read   Receives the number of the read, never 0.
+ * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT before the first image, with 16 reads begun, for an AOV that
+ * samples do not accumulate or that was not accumulated, for a light group that was not accumulated, and for AOVs and
+ *         light groups of debug views; or a [GL] error.
+ */
+CUMULET_API cumulet_status cumulet_begin_read(cumulet_viewer* viewer, const cumulet_read_desc* desc, uint64_t* read);
+/**
+ * [GL] Returns whether a read is ready, and its values if it is. Never waits for the GPU. The call that returns values
+ * ends the read.
+ *
+ * Threads: any thread with the context.
+ *
+ * @param viewer An attached viewer.
+ * @param read   Number of the read.
+ * @param values Receives width x height x channels floats, first pixel top left, if info->ready is 1. NULL: the read is
+ *               only looked at, and does not end.
+ * @param count  Floats at values.
+ * @param info   Receives the state; its struct_size must be set.
+ * @return CUMULET_OK, also if the read is not ready; CUMULET_ERROR_INVALID_ARGUMENT for a number that is no read (it
+ *         has ended, or the viewer was detached) and if count is too small; or a [GL] error.
+ */
+CUMULET_API cumulet_status cumulet_finish_read(cumulet_viewer* viewer, uint64_t read, float* values, size_t count,
+                                               cumulet_read_info* info);
+/**
+ * [GL] Ends a read without its values. Does nothing if there is no such read.
+ *
+ * Threads: any thread with the context.
+ *
+ * @param viewer An attached viewer.
+ * @param read   Number of the read.
+ * @return CUMULET_OK or a [GL] error.
+ */
+CUMULET_API cumulet_status cumulet_cancel_read(cumulet_viewer* viewer, uint64_t read);
 
 /** The kind of an object that has a matte. */
 typedef enum cumulet_object_kind {
@@ -4035,7 +4119,7 @@ typedef const char* (*cumulet_object_name_fn)(void* user, cumulet_object_kind ki
  *   surfaces cover partially. The result does not depend on the image's samples.
  * - The call takes 16 KB of GL memory per column of pixels.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param name   Called once per object during this call.
@@ -4066,7 +4150,7 @@ CUMULET_API uint32_t cumulet_cryptomatte_id(const char* name);
  * each pixel are equal. Samples count as independent; because they are stratified, the true error is smaller. The call
  * reads the image back: do not call it every frame.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param noise  Receives the noise; 0.02 is 2 %.
@@ -4079,7 +4163,7 @@ CUMULET_API cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double*
  * specific to the library's version and contain nothing of the scene. Only shaded images without previews
  * (CUMULET_PREVIEW_OFF) have them.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param bytes  Receives the bytes. NULL: only *size is written.
@@ -4096,7 +4180,7 @@ CUMULET_API cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, voi
  * image then ends as the other one would have, bit for bit, also with a noise target. An image that has all its samples
  * already does not change.
  *
- * Threads: one call per viewer at a time.
+ * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
  * @param bytes  The bytes.
@@ -4155,7 +4239,7 @@ typedef struct cumulet_stats {
 /**
  * Returns statistics of a viewer.
  *
- * Threads: one call per viewer at a time. No GL.
+ * Threads: any thread; waits for running [GL] calls. No GL.
  *
  * @param viewer The viewer.
  * @param stats  Receives the statistics; its struct_size must be set.

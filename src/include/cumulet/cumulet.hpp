@@ -1644,6 +1644,24 @@ class Viewer {
   [[nodiscard]] Result<> read_light_group(std::uint32_t group, std::span<float> rgb) noexcept {
     return result(cumulet_read_light_group(handle(), group, rgb.data(), rgb.size()));
   }
+  /// Begins to read without waiting. Returns the number of the read.
+  [[nodiscard]] Result<std::uint64_t> begin_read(const ReadDesc& desc) noexcept {
+    const cumulet_read_desc c = desc;
+    std::uint64_t read = 0;
+    if (auto done = result(cumulet_begin_read(handle(), &c, &read)); !done) return done.error();
+    return read;
+  }
+  /// Fills `values` if the read is ready, which ends it. An empty span: the read is only looked at.
+  [[nodiscard]] Result<ReadInfo> finish_read(std::uint64_t read, std::span<float> values) noexcept {
+    auto c = detail::sized<cumulet_read_info>();
+    if (auto done = result(cumulet_finish_read(handle(), read, values.data(), values.size(), &c)); !done) {
+      return done.error();
+    }
+    return ReadInfo::of(c);
+  }
+  [[nodiscard]] Result<> cancel_read(std::uint64_t read) noexcept {
+    return result(cumulet_cancel_read(handle(), read));
+  }
   /// `name` is called as name(ObjectKind, tag, transform_index) and returns const char*, see cumulet_object_name_fn. It
   /// must not throw.
   template <class Name>

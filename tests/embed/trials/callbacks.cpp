@@ -77,7 +77,15 @@ void Caller::call_others() {
   CALL(cumulet_environment_open, "none.hdr", &new_environment, nullptr, 0);
   CALL(cumulet_environment_from_memory, bytes.data(), bytes.size(), nullptr, &new_environment, nullptr, 0);
   CALL(cumulet_environment_from_stream, &stream, nullptr, &new_environment, nullptr, 0);
-  for (cumulet_viewer* v : {viewer, other}) CALL(cumulet_set_display_lut, v, nullptr);
+  const auto read = make_desc<cumulet_read_desc>();
+  auto read_info = make_desc<cumulet_read_info>();
+  std::uint64_t number = 0;
+  for (cumulet_viewer* v : {viewer, other}) {
+    CALL(cumulet_set_display_lut, v, nullptr);
+    CALL(cumulet_begin_read, v, &read, &number);
+    CALL(cumulet_finish_read, v, 1, nullptr, 0, &read_info);
+    CALL(cumulet_cancel_read, v, 1);
+  }
   if (new_volume != nullptr || new_environment != nullptr) wrong.push_back("a reader's handle");
 }
 

@@ -23,6 +23,23 @@ using test::ball_volume;
 using test::BallFile;
 using test::CppViewer;
 
+TEST_F(CppViewer, ReadsWithoutWaiting) {
+  Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+  viewer.set_volume(ball_volume()).value();
+  viewer.set_sampling({.samples = 4, .preview = Preview::off}).value();
+  viewer.frame_all().value();
+  converge(viewer, 24, 16);
+  const std::uint64_t read = viewer.begin_read({.source = ReadSource::linear}).value();
+  EXPECT_EQ(viewer.finish_read(read, {})->width, 24U);
+  std::vector<float> linear(24 * 16 * 4);
+  std::vector<float> copied(linear.size());
+  viewer.read_linear(linear).value();
+  while (!viewer.finish_read(read, copied)->ready) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(copied, linear);
+  EXPECT_EQ(viewer.finish_read(read, copied).error().status, StatusCode::invalid_argument);
+  EXPECT_TRUE(viewer.cancel_read(viewer.begin_read({.source = ReadSource::aov, .aov = Aov::error}).value()));
+}
+
 TEST_F(CppViewer, ShowsAVolume) {
   const BallFile file;
   Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
