@@ -43,6 +43,15 @@ CmGuides cm_guides_at(ivec2 texel) { return cm_unpacked(texelFetch(cm_guides, te
 // Coverage of a pixel. Its radiance is proportional to this if the material there looks the same.
 float cm_cover(float open) { return 1.0 - 0.98 * open; }
 
+// Light (front) of a pixel with `ratio` times the coverage. Radiance and coverage change together: otherwise dark and
+// bright spots would remain where a pixel's few samples hit the background, or nothing but the surface. Samples cover
+// a pixel at most once; the caller limits the result where it is a mean of several pixels.
+vec4 cm_scaled_cover(vec4 front, float ratio) { return vec4(ratio * front.rgb, 1.0 - ratio * (1.0 - front.a)); }
+vec4 cm_within_cover(vec4 front) {
+  float most = max(1.0, 1.0 - front.a);
+  return vec4(front.rgb / most, max(0.0, front.a));
+}
+
 // Returns the difference of smaller magnitude. The other one may cross an edge.
 float cm_smaller(float a, float b) { return abs(a) < abs(b) ? a : b; }
 

@@ -24,9 +24,11 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_SPREAD) uniform writeonly image2D cm_
 // The history's variance counts as at most this many samples beside the new ones.
 #define CM_FEW 4.0
 
-// Statistics of a pixel's neighborhood, itself included.
+// Statistics of a pixel's neighborhood, itself included, of the samples that cover it. The others say nothing about
+// radiance: without this, a history that is darkened because they are dark, but keeps its coverage, leaves dark spots
+// where the ground covers a part of the pixels.
 struct CmAround {
-  vec3 now;  // means over coverage: of new samples, of the history
+  vec3 now;  // means: of new samples, of the history
   vec3 then;
   vec3 deviation;   // standard deviation of pixels' means
   float variance;   // variance of a sample's luminance
@@ -49,16 +51,16 @@ CmAround cm_around(ivec2 texel, CmGuides here, vec4 slopes) {
       CmGuides there = cm_guides_at(at);
       vec4 spread = texelFetch(cm_spread, at, 0);
       if (!there.finite || spread.z == 0.0) continue;
-      float over = 1.0 / cm_cover(spread.x);
-      vec3 front = over * texelFetch(cm_front, at, 0).rgb;
+      vec4 front = texelFetch(cm_front, at, 0);
       CmLit lit = cm_unpacked_light(texelFetch(cm_history_light, at, 0));
       float weight = cm_alike(here, there, slopes, vec2(x, y));
-      now += weight * spread.z * front;
-      squares += weight * spread.z * front * front;
-      moments += weight * over * over * vec2(spread.z * spread.y, lit.samples * lit.moment);
-      n_now += weight * spread.z;
-      then += weight * lit.samples * over * lit.front.rgb;
-      n_then += weight * lit.samples;
+      float cover = cm_cover(front.a);
+      now += weight * spread.z * front.rgb;
+      squares += weight * spread.z * front.rgb * front.rgb / cover;
+      moments += weight * vec2(spread.z * spread.y, lit.samples * lit.moment);
+      n_now += weight * spread.z * cover;
+      then += weight * lit.samples * lit.front.rgb;
+      n_then += weight * lit.samples * cm_cover(lit.front.a);
     }
   }
   CmAround around;
@@ -76,7 +78,7 @@ CmAround cm_around(ivec2 texel, CmGuides here, vec4 slopes) {
 }
 
 // History of the pixel, reduced and clamped where it disagrees with the new samples.
-CmLit cm_trusted_history(CmLit lit, CmAround around, float cover, float samples) {
+CmLit cm_trusted_history(CmLit lit, CmAround around, float samples) {
   if (around.samples_now == 0.0 || lit.samples == 0.0) return lit;
   float off = cm_luminance(around.then - around.now);
   float noise = around.variance * (1.0 / around.samples_now + 1.0 / around.samples_then);
@@ -87,6 +89,7 @@ CmLit cm_trusted_history(CmLit lit, CmAround around, float cover, float samples)
   lit.samples *= max(0.0, 1.0 - samples / CM_ENOUGH);
   float unknown = around.variance * CM_FEW / around.samples_now;
   vec3 room = CM_CLAMP * sqrt(around.deviation * around.deviation + unknown);
+  float cover = cm_cover(lit.front.a);
   vec3 clamped = cover * clamp(lit.front.rgb / cover, around.now - room, around.now + room);
   float before = cm_luminance(lit.front.rgb);
   float after = cm_luminance(clamped);
@@ -106,7 +109,7 @@ void main() {
   if (here.finite) {
     CmAround around = cm_around(texel, here, cm_slopes(texel, here));
     CmLit lit = cm_unpacked_light(texelFetch(cm_history_light, texel, 0));
-    lit = cm_trusted_history(lit, around, cm_cover(spread.x), spread.z);
+    lit = cm_trusted_history(lit, around, spread.z);
     if (lit.samples > 0.0) {
       float all = spread.z + lit.samples;
       front += (lit.samples / all) * (lit.front - front);

@@ -30,9 +30,10 @@ void main() {
     vec4 known = texelFetch(cm_emission, texel, 0);
     vec3 tint = cm_tint(cm_surfaces * texelFetch(cm_albedo, texel, 0).rgb, covered, through.x, known);
     float own = cm_open(covered, texelFetch(cm_volume_z, texel, 0).y, through.x);
-    // If only the pixel's own samples count, the uncovered fraction is theirs.
-    float part = clamp(front.a + own - open, 0.0, 1.0);
-    vec3 lit = tint * front.rgb * (cm_cover(own) / cm_cover(open));
+    // From the coverage of the mixed pixels to that of this one. If only its own samples count, that is theirs.
+    front = cm_within_cover(cm_scaled_cover(front, cm_cover(own) / cm_cover(open)));
+    float part = min(front.a, 1.0);
+    vec3 lit = tint * front.rgb;
     mean.front = vec4(max(vec3(0.0), lit + known.rgb), 1.0 - part);
     mean.background = part * imageLoad(cm_behind, texel).rgb;
   } else {

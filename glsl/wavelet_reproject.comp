@@ -83,7 +83,7 @@ void cm_recall(inout CmLit sum, CmGeometry here, float cover, vec4 before, bool 
     vec2 near = mix(1.0 - part, part, vec2(offset));
     float weight = share * near.x * near.y * exp(-differs) * lit.samples;
     float ratio = cover / cm_cover(there.open);
-    sum.front += weight * vec4(ratio * lit.front.rgb, lit.front.a + here.open - there.open);
+    sum.front += weight * cm_scaled_cover(lit.front, ratio);
     sum.moment += weight * ratio * ratio * lit.moment;
     sum.samples += weight;
   }
@@ -112,8 +112,10 @@ void main() {
   }
   if (sum.samples > 0.0) {
     sum.front /= sum.samples;
-    sum.front.a = clamp(sum.front.a, 0.0, 1.0);
     sum.moment /= sum.samples;
+    float most = max(1.0, 1.0 - sum.front.a);
+    sum.front = cm_within_cover(sum.front);
+    sum.moment /= most * most;
     // A sample of a lower-resolution image counts for several pixels.
     vec2 coarser = vec2(textureSize(cm_history_light, 0)) / vec2(size);
     sum.samples = min(cm_most, sum.samples * min(1.0, coarser.x * coarser.y));

@@ -42,6 +42,10 @@ vec3 cm_behind_near(ivec2 texel) {
   return vec3(0.0);
 }
 
+// Coverage of a pixel for this test. Where its few samples cover more than feature rays do, their light is not that of
+// a firefly.
+float cm_hit_cover(float open, float part) { return cm_cover(min(open, part)); }
+
 // Brightest pixels of a neighborhood: luminance over coverage.
 struct CmBrightest {
   float most;  // of the brightest pixel, which may be the center; next: of the second brightest
@@ -58,7 +62,8 @@ CmBrightest cm_brightest(ivec2 texel, CmGuides here, vec4 slopes) {
       if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, size))) continue;
       CmGuides there = cm_guides_at(at);
       if (!there.finite || cm_alike(here, there, slopes, vec2(x, y)) < CM_ALIKE) continue;
-      float luminance = cm_luminance(texelFetch(cm_front, at, 0).rgb) / cm_cover(texelFetch(cm_spread, at, 0).x);
+      vec4 front = texelFetch(cm_front, at, 0);
+      float luminance = cm_luminance(front.rgb) / cm_hit_cover(texelFetch(cm_spread, at, 0).x, front.a);
       about.next = max(about.next, min(about.most, luminance));
       about.most = max(about.most, luminance);
       if (luminance > 0.0) about.lit += 1u;
@@ -68,9 +73,9 @@ CmBrightest cm_brightest(ivec2 texel, CmGuides here, vec4 slopes) {
 }
 
 // Dimming factor of a pixel, 1 if it is no firefly. spread: input of this pass.
-float cm_dimmed(vec3 front, vec4 spread, CmBrightest about) {
-  float cover = cm_cover(spread.x);
-  float luminance = cm_luminance(front);
+float cm_dimmed(vec4 front, vec4 spread, CmBrightest about) {
+  float cover = cm_hit_cover(spread.x, front.a);
+  float luminance = cm_luminance(front.rgb);
   if (about.lit < CM_LIT || luminance < cover * about.most) return 1.0;
   float room = CM_BRIGHTER * cover * about.next;
   if (spread.z >= 2.0) {
@@ -107,7 +112,7 @@ void main() {
       vec4 color = texelFetch(cm_front, at, 0);
       float weight = cm_alike(here, there, slopes, vec2(x, y));
       float cover = cm_cover(other.x);
-      float dimmed = cm_dimmed(color.rgb, other, about);
+      float dimmed = cm_dimmed(color, other, about);
       color.rgb *= dimmed;
       other.y *= dimmed * dimmed;
       float luminance = cm_luminance(color.rgb);
@@ -141,7 +146,7 @@ void main() {
     variance = (1.0 + CM_FEW / samples) / samples * vec2(sample_variance, open * (1.0 - open));
   }
   vec4 own = texelFetch(cm_front, texel, 0);
-  if (here.finite) own.rgb *= cm_dimmed(own.rgb, spread, about);
+  if (here.finite) own.rgb *= cm_dimmed(own, spread, about);
   imageStore(cm_front_out, texel, own);
   imageStore(cm_spread_out, texel, vec4(spread.x, variance, 0.0));
   float own_cover = cm_cover(spread.x);

@@ -321,10 +321,7 @@ void App::accept(const Answer& answer) {
   if (answer.status.noise && answer.status.noise != model_.status.noise)
     model_.charts.noise_percent.add(static_cast<float>(100.0 * *answer.status.noise));
   if (answer.density_scale) model_.scene.medium.density_scale = *answer.density_scale;
-  if (answer.look && is_unsaid()) {
-    look_ = answer.look;
-    model_.scene.medium = *look_;
-  }
+  if (answer.look && is_unsaid()) take_look(*answer.look);
   if (answer.picked) model_.chosen = answer.picked->item;
   // Changes during startup are not undo steps.
   if (loading_.starting && (answer.density_scale || answer.look)) history_.emplace(model_.scene);
@@ -344,6 +341,17 @@ void App::accept(const Answer& answer) {
     if (shown > 1 && !clear) panel_.picker().open(model_.scene.volume, Window::wake);
   }
   if (!exchange_.waiting()) loading_.starting = false;
+}
+
+void App::take_look(const cumulet_medium_desc& look) {
+  look_ = look;
+  model_.scene.medium = look;
+  const bool burns = !demo::is_unsaid(look);
+  if (!burns) give_day(model_.scene);
+  if (burns && take_dusk(model_.scene))
+    show_message(
+        model_, false, "The volume burns: dusk light and the filmic tone map", now_,
+        MessageButton{"Daylight", "Sets the default daylight and tone map. Ctrl+Z undoes that.", {Action::daylight}});
 }
 
 void App::remember_files(const Answer& answer) {

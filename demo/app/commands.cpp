@@ -235,13 +235,14 @@ struct App::Commands {
        [](App& app, const Command& command) {
          if (!app.ask_about_changes({command})) app.quit_ = true;
        }},
+      {Action::daylight, [](App& app, const Command&) { give_day(app.model_.scene); }},
   });
 
   /// Returns true if each action has a function, at its index.
   static constexpr bool is_complete() {
     for (std::size_t i = 0; i < table.size(); ++i)
       if (table[i].action != static_cast<Action>(i)) return false;
-    return table.size() == static_cast<std::size_t>(Action::quit_anyway) + 1;
+    return table.size() == static_cast<std::size_t>(Action::daylight) + 1;
   }
 };
 

@@ -128,7 +128,7 @@ Menu view_menu() {
            separator,
            {"Panel",
             {Action::toggle_panel},
-            "Shows or hides the panel.",
+            "Shows or hides the panel and the tools.",
             nullptr,
             [](const Model& model) { return model.panel; }},
            scale_entry<0>("Scale of the screen"),

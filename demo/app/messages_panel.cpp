@@ -17,8 +17,8 @@ constexpr ImU32 notice_color = IM_COL32(127, 180, 230, 255);
 void Panel::messages(Model& model, std::vector<Command>& commands) {
   std::erase_if(model.messages, [this](const Message& message) { return !message.error && message.until < time_; });
   if (model.messages.empty()) return;
-  const auto right = static_cast<float>(view_.width);
-  const float width = std::min(ui_.px(toast_width), right - ui_.px(24.0f));
+  const auto right = static_cast<float>(view_.x + view_.width);
+  const float width = std::min(ui_.px(toast_width), static_cast<float>(view_.width) - ui_.px(24.0f));
   ImGui::SetNextWindowPos({right - ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(44.0f)},
                           ImGuiCond_Always, {1.0f, 1.0f});
   ImGui::SetNextWindowSize({width, 0.0f});
@@ -63,8 +63,9 @@ void Panel::toast(const Message& message, std::vector<Command>& commands) {
 
 void Panel::log(Model& model, std::vector<Command>& commands) {
   const float width = static_cast<float>(view_.width) - ui_.px(24.0f);
-  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(44.0f)}, ImGuiCond_Always,
-                          {0.0f, 1.0f});
+  ImGui::SetNextWindowPos(
+      {static_cast<float>(view_.x) + ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(44.0f)},
+      ImGuiCond_Always, {0.0f, 1.0f});
   ImGui::SetNextWindowSize(
       {std::min(ui_.px(640.0f), width), std::min(ui_.px(260.0f), static_cast<float>(view_.height) * 0.6f)});
   ImGui::Begin("Messages", &model.log_open,

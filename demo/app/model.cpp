@@ -79,7 +79,7 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
       {GLFW_KEY_D, ctrl, {Action::duplicate_selected}, "Ctrl+D", "Duplicate the selected object"},
       {GLFW_KEY_DELETE, 0, {Action::remove_selected}, "Delete", "Remove the selected object"},
-      {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel"},
+      {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel and the tools"},
       {GLFW_KEY_F2,
        0,
        {Action::focus_panel},
@@ -259,6 +259,40 @@ void take_daylight(SceneOptions& scene) {
 
 void give_daylight(SceneOptions& scene) {
   if (settings::same(scene.light, spelled_out({}))) scene.light = daylight();
+}
+
+namespace {
+
+constexpr float dusk_exposure = 1.0f;  // stops
+
+// The sun is just above the horizon.
+cumulet_sun_sky_desc dusk() {
+  cumulet_sun_sky_desc light = daylight();
+  light.sun_elevation_degrees = 3.0f;
+  return light;
+}
+
+bool is_display(const SceneOptions& scene, float exposure, cumulet_tone_map tone_map) {
+  return scene.display.exposure_stops == exposure && scene.display.tone_map == tone_map;
+}
+
+}  // namespace
+
+bool take_dusk(SceneOptions& scene) {
+  if (!settings::same(scene.light, daylight()) || !scene.environment.empty()) return false;
+  if (!is_display(scene, 0.0f, CUMULET_TONE_MAP_NEUTRAL)) return false;
+  scene.light = dusk();
+  scene.display.exposure_stops = dusk_exposure;
+  scene.display.tone_map = CUMULET_TONE_MAP_FILMIC;
+  return true;
+}
+
+bool give_day(SceneOptions& scene) {
+  if (!settings::same(scene.light, dusk()) || !is_display(scene, dusk_exposure, CUMULET_TONE_MAP_FILMIC)) return false;
+  scene.light = daylight();
+  scene.display.exposure_stops = 0.0f;
+  scene.display.tone_map = CUMULET_TONE_MAP_NEUTRAL;
+  return true;
 }
 
 namespace {

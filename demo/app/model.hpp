@@ -87,7 +87,8 @@ enum class Action {
   draw_region,   // the next drag over the image sets the render region
   clear_region,  // removes the render region
   quit,          // asks about unsaved changes and unfinished pictures
-  quit_anyway    // asks only about unsaved changes
+  quit_anyway,   // asks only about unsaved changes
+  daylight       // sets the default daylight and display instead of the dusk of a burning volume
 };
 
 struct Command {
@@ -281,6 +282,11 @@ void open_surfaces(Model& model, const std::string& path);
 /// environment is removed and there is no other sun or sky.
 void take_daylight(SceneOptions& scene);
 void give_daylight(SceneOptions& scene);
+/// Sets dusk light with the filmic tone map and a matching exposure, in which flames look bright, if the scene has the
+/// default daylight and display. Returns true if it did.
+bool take_dusk(SceneOptions& scene);
+/// Sets the default daylight and display again if the scene has exactly those of take_dusk. Returns true if it did.
+bool give_day(SceneOptions& scene);
 
 /// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear
 /// after a while, those with a button later.

@@ -14,10 +14,12 @@
 #include <utility>
 #include <vector>
 
+#include "empty_window.hpp"
 #include "history.hpp"
 #include "menus.hpp"
 #include "renders_panel.hpp"
 #include "status_line.hpp"
+#include "tool_bar.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -41,10 +43,11 @@ std::string file_name(const std::string& path) { return std::filesystem::path(pa
 Rectangle Panel::viewport(const Model& model, double width, double height, float scale) {
   const double wanted = std::round(static_cast<double>(model.preferences.panel_width * scale));
   const double side = model.panel ? std::min(wanted, width * 0.5) : 0.0;
+  const double bar = model.panel ? std::round(static_cast<double>(tool_bar_width * scale)) : 0.0;
   const double above = std::min(static_cast<double>(ImGui::GetFrameHeight()), height);
   const double below =
       model.status.play ? std::min(std::round(static_cast<double>(timeline_height * scale)), height - above) : 0.0;
-  return {0.0, above, std::max(width - side, 0.0), height - above - below};
+  return {bar, above, std::max(width - side - bar, 0.0), height - above - below};
 }
 
 void Panel::draw(Model& model, float scale, double time, std::vector<Command>& commands) {
@@ -53,9 +56,12 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   view_ = viewport(model, static_cast<double>(screen.x), static_cast<double>(screen.y), scale);
   draw_menu_bar(ui_, model, commands);
-  if (model.panel) side(model, commands);
+  if (model.panel) {
+    side(model, commands);
+    draw_tool_bar(ui_, view_, model, commands);
+  }
   if (model.status.play) timeline(model, commands);
-  if (!model.status.has_content && !model.status.busy) hint();
+  if (!model.status.has_content && !model.status.busy) draw_empty_window(ui_, view_, model, commands);
   // No progress bar for short work, such as the sky while the user drags the sun.
   const bool works = model.status.work.stage != CUMULET_STAGE_IDLE || model.status.compiled;
   if (model.status.busy && (works || !model.status.loading.empty())) loading(model, commands);
@@ -75,7 +81,7 @@ void Panel::draw(Model& model, float scale, double time, std::vector<Command>& c
 
 void Panel::side(Model& model, std::vector<Command>& commands) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  const auto left = static_cast<float>(view_.width);
+  const auto left = static_cast<float>(view_.x + view_.width);
   const auto top = static_cast<float>(view_.y);
   if (model.chosen && model.chosen != seen_) model.subject = *model.chosen;
   seen_ = model.chosen;
@@ -426,34 +432,12 @@ void Panel::statistics(const Model& model) {
   ui_.value_row("Renderer", stats.gl_renderer);
 }
 
-void Panel::hint() const {
-  constexpr std::array lines{"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here,",
-                             "and an environment (.hdr, .exr) to light it,", "or press Ctrl+O.  F1 shows all keys."};
-  const float padding = 2.0f * ImGui::GetStyle().WindowPadding.x;
-  float width = 0.0f;
-  for (const char* line : lines) width = std::max(width, ImGui::CalcTextSize(line).x + padding);
-  width = std::min(width, static_cast<float>(view_.width) - ui_.px(24.0f));
-  const ImVec2 middle(static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.y + 0.5 * view_.height));
-  ImGui::SetNextWindowPos(middle, ImGuiCond_Always, {0.5f, 0.5f});
-  ImGui::SetNextWindowSize({width, 0.0f});
-  ImGui::SetNextWindowBgAlpha(0.75f);
-  ImGui::Begin("hint", nullptr, (overlay & ~ImGuiWindowFlags_AlwaysAutoResize) | ImGuiWindowFlags_NoInputs);
-  ImGui::PushTextWrapPos();
-  for (const char* line : lines) {
-    const float room = ImGui::GetContentRegionAvail().x;
-    const float length = ImGui::CalcTextSize(line, nullptr, false, room).x;
-    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(0.0f, 0.5f * (room - length)));
-    ImGui::TextUnformatted(line);
-  }
-  ImGui::PopTextWrapPos();
-  ImGui::End();
-}
-
 void Panel::loading(const Model& model, std::vector<Command>& commands) {
   const Work work = work_of(model.status);
   const float width = std::min(ui_.px(380.0f), static_cast<float>(view_.width) - ui_.px(24.0f));
-  ImGui::SetNextWindowPos({static_cast<float>(view_.width) * 0.5f, static_cast<float>(view_.y) + ui_.px(12.0f)},
-                          ImGuiCond_Always, {0.5f, 0.0f});
+  ImGui::SetNextWindowPos(
+      {static_cast<float>(view_.x + 0.5 * view_.width), static_cast<float>(view_.y) + ui_.px(12.0f)}, ImGuiCond_Always,
+      {0.5f, 0.0f});
   ImGui::SetNextWindowSize({width, 0.0f});
   ImGui::SetNextWindowBgAlpha(0.88f);
   ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
@@ -476,8 +460,9 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
 
 void Panel::state_line(const Model& model) {
   state_ = status_text(model);
-  ImGui::SetNextWindowPos({ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(10.0f)}, ImGuiCond_Always,
-                          {0.0f, 1.0f});
+  ImGui::SetNextWindowPos(
+      {static_cast<float>(view_.x) + ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(10.0f)},
+      ImGuiCond_Always, {0.0f, 1.0f});
   ImGui::SetNextWindowBgAlpha(0.55f);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(9.0f), ui_.px(4.0f)});
   ImGui::Begin("state", nullptr, overlay | ImGuiWindowFlags_NoInputs);
@@ -494,8 +479,8 @@ void Panel::state_line(const Model& model) {
   // Rounded to whole pixels, because a smaller change would redraw the window without effect.
   const double part = std::clamp(model.status.frame.progress, 0.0, 1.0);
   ImGui::GetForegroundDrawList()->AddRectFilled(
-      {0.0f, static_cast<float>(view_.y + view_.height) - ui_.px(2.0f)},
-      {static_cast<float>(std::floor(view_.width * part)), static_cast<float>(view_.y + view_.height)},
+      {static_cast<float>(view_.x), static_cast<float>(view_.y + view_.height) - ui_.px(2.0f)},
+      {static_cast<float>(view_.x + std::floor(view_.width * part)), static_cast<float>(view_.y + view_.height)},
       IM_COL32(95, 143, 191, 200));
 }
 

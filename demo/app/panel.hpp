@@ -79,7 +79,6 @@ class Panel {
   void ground(Model& model);
   void sun_angle(const settings::SettingInfo& info, cumulet_sun_sky_desc& light);
 
-  void hint() const;
   void loading(const Model& model, std::vector<Command>& commands);
   /// Draws the messages as toasts at the lower right of the image.
   void messages(Model& model, std::vector<Command>& commands);

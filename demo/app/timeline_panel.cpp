@@ -37,7 +37,7 @@ void Panel::sequence(Model& model, std::vector<Command>& commands) {
 void Panel::timeline(Model& model, std::vector<Command>& commands) {
   const Play& play = *model.status.play;
   const auto top = static_cast<float>(view_.y + view_.height);
-  const auto width = static_cast<float>(view_.width);
+  const auto width = static_cast<float>(view_.x + view_.width);
   ImGui::SetNextWindowPos({0.0f, top});
   ImGui::SetNextWindowSize({width, ImGui::GetIO().DisplaySize.y - top});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "light/air.hpp"
 #include "light/spectrum.hpp"
 
 namespace cumulet::light {
@@ -19,34 +20,22 @@ using glm::dvec3;
 using glm::vec3;
 using std::numbers::pi;
 
-// km
-constexpr double ground = 6360.0;
-constexpr double top = 6460.0;
-constexpr double air_scale_height = 8.0;
-constexpr double aerosol_scale_height = 1.2;
-constexpr double ozone_height = 25.0;
-constexpr double ozone_half_width = 15.0;
+using air::aerosol_albedo;
+using air::density;
+using air::ground;
+using air::sun_outside;
+using air::top;
 
 constexpr double sun_angular_radius = 0.00465;  // radians
-constexpr double sun_outside = 5.0;     // sun's irradiance outside of the atmosphere, equal in all color components
-constexpr double aerosol_albedo = 0.9;  // single-scattering albedo of aerosols
-constexpr double aerosol_anisotropy = 0.8;
-constexpr double ozone_column = 300.0 * 2.687e20;  // 300 Dobson units, molecules per square meter
 
-// Bins of 370 to 380, ..., 780 to 790 nm. solar_irradiance: the sun's irradiance outside of the atmosphere, W / (m^2
-// nm) (ASTM G-173). ozone_cross_section: at 233 K, m^2 (Serdyuchenko et al. 2014). Each is the mean over the bin, as
-// collected by Bruneton (2017).
-constexpr std::array<double, 42> solar_irradiance = {
-    1.14259, 1.01249, 1.14716, 1.72765, 1.73054, 1.6887,  1.61253, 1.91198, 2.03474, 2.02042, 2.02212,
-    1.93377, 1.95809, 1.91686, 1.8298,  1.8685,  1.8931,  1.85149, 1.8504,  1.8341,  1.8345,  1.8147,
-    1.78158, 1.7533,  1.6965,  1.68194, 1.64654, 1.6048,  1.52143, 1.55622, 1.5113,  1.474,   1.4482,
-    1.41018, 1.36775, 1.34188, 1.31429, 1.28303, 1.26758, 1.2367,  1.2082,  1.18737};
-constexpr std::array<double, 42> ozone_cross_section = {
-    2.182e-28, 2.818e-28, 6.636e-28, 1.527e-27, 2.763e-27, 5.52e-27,  8.451e-27, 1.582e-26, 2.316e-26,
-    3.669e-26, 4.924e-26, 7.752e-26, 9.016e-26, 1.48e-25,  1.602e-25, 2.139e-25, 2.755e-25, 3.091e-25,
-    3.5e-25,   4.266e-25, 4.672e-25, 4.398e-25, 4.701e-25, 5.019e-25, 4.305e-25, 3.74e-25,  3.215e-25,
-    2.662e-25, 2.238e-25, 1.852e-25, 1.473e-25, 1.209e-25, 9.423e-26, 7.455e-26, 6.566e-26, 5.105e-26,
-    4.15e-26,  4.228e-26, 3.237e-26, 2.451e-26, 2.801e-26, 2.534e-26};
+// Most light that aerosols scatter stays near its direction. In the delta-Eddington approximation (Joseph, Wiscombe and
+// Weinman 1976) this fraction counts as not scattered, and the rest as scattered equally in all directions. The first
+// scattering keeps its phase function (Nakajima and Tanaka 1988). With isotropic scattering instead, the horizon was up
+// to 45 % too dark, and the sky above it as much too bright.
+constexpr double aerosol_forward = air::aerosol_anisotropy * air::aerosol_anisotropy;
+constexpr auto aerosol_rest = static_cast<float>(1.0 - aerosol_forward);
+// Extinction of aerosols without that fraction.
+constexpr auto aerosol_extinction = static_cast<float>(1.0 - aerosol_albedo * aerosol_forward);
 
 // Every second sample of a Spectrum.
 constexpr std::size_t band_count = 21;
@@ -54,16 +43,12 @@ using Bands = std::array<float, band_count>;
 
 constexpr std::size_t sample_of(std::size_t band) { return 2 * band; }
 
-double at_band(const std::array<double, 42>& bins, std::size_t band) {
-  return 0.5 * (bins[sample_of(band)] + bins[sample_of(band) + 1]);
-}
-
 // Contribution of a band to a color: a triangular spectrum that falls to 0 at the adjacent bands.
 std::array<vec3, band_count> band_colors() {
   std::array<vec3, band_count> colors{};
   dvec3 all(0.0);
   for (std::size_t band = 0; band < band_count; ++band) {
-    const double sun = at_band(solar_irradiance, band);
+    const double sun = air::at_sample(air::solar_irradiance, sample_of(band));
     Spectrum spectrum{};
     const std::size_t sample = sample_of(band);
     spectrum[sample] = sun;
@@ -75,13 +60,6 @@ std::array<vec3, band_count> band_colors() {
   }
   for (vec3& color : colors) color *= vec3(sun_outside / all);
   return colors;
-}
-
-// Densities of air, aerosols and ozone per km, as fractions of the whole column above the ground.
-dvec3 density(double height) {
-  return {std::exp(-height / air_scale_height) / air_scale_height,
-          std::exp(-height / aerosol_scale_height) / aerosol_scale_height,
-          std::max(0.0, 1.0 - std::abs(height - ozone_height) / ozone_half_width) / ozone_half_width};
 }
 
 // Distances along a ray from radius r; mu is the cosine to the zenith.
@@ -164,23 +142,20 @@ class Paths {
 class Atmosphere {
  public:
   explicit Atmosphere(const SkyModel& model) : ground_albedo_(model.ground_albedo) {
-    // Preetham, Shirley and Smits, "A Practical Analytic Model for Daylight" (1999), after Angstrom.
-    const double aerosols = std::max(0.0, 0.04608 * model.turbidity - 0.04586);
     for (std::size_t band = 0; band < band_count; ++band) {
-      const double um = 1.0e-3 * wavelength(sample_of(band));
-      const double um2 = um * um;
-      // Hansen and Travis, "Light Scattering in Planetary Atmospheres" (1974).
-      air_[band] = static_cast<float>(0.008569 / (um2 * um2) * (1.0 + 0.0113 / um2 + 0.00013 / (um2 * um2)));
-      aerosols_[band] = static_cast<float>(aerosols * std::pow(um, -1.3));
-      ozone_[band] = static_cast<float>(ozone_column * at_band(ozone_cross_section, band));
+      const glm::vec3 column(air::column(model.turbidity, sample_of(band)));
+      air_[band] = column.x;
+      aerosols_[band] = column.y;
+      ozone_[band] = column.z;
     }
     scatter_more();
   }
 
   [[nodiscard]] double ground_albedo() const { return ground_albedo_; }
 
-  // Returns the sunlight at radius r; mu is the cosine of the sun's zenith angle.
-  [[nodiscard]] Bands sunlight(double r, double mu) const {
+  // Returns the sunlight at radius r; mu is the cosine of the sun's zenith angle. aerosols: factor of their
+  // extinction, 1 for the disk alone.
+  [[nodiscard]] Bands sunlight(double r, double mu, float aerosols = aerosol_extinction) const {
     const double above = (mu - horizon(r)) / sun_angular_radius;
     Bands result{};
     if (above <= -1.0) return result;
@@ -189,14 +164,14 @@ class Atmosphere {
     const auto part = static_cast<float>(0.5 + (edge * std::sqrt(1.0 - edge * edge) + std::asin(edge)) / pi);
     const vec3 path = paths_(r, std::max(mu, horizon(r)));
     for (std::size_t b = 0; b < band_count; ++b) {
-      result[b] = part * std::exp(-(path.x * air_[b] + path.y * aerosols_[b] + path.z * ozone_[b]));
+      result[b] = part * std::exp(-(path.x * air_[b] + path.y * aerosols * aerosols_[b] + path.z * ozone_[b]));
     }
     return result;
   }
 
   // Marches along a ray from radius r. Calls visit(radius, cosine of the sun, air, aerosols) per step. The last two
   // are, per band, the fraction of light that they scatter and that reaches the start. Returns the transmittance of the
-  // whole ray.
+  // whole ray, with aerosol_extinction.
   template <class Visit>
   Bands march(double r, double mu, double azimuth, double sun_mu, int steps, const Visit& visit) const {
     const dvec3 start(0.0, r, 0.0);
@@ -219,7 +194,7 @@ class Atmosphere {
       for (std::size_t b = 0; b < band_count; ++b) {
         const float by_air = amount.x * air_[b];
         const float by_aerosols = amount.y * aerosols_[b];
-        const float depth = by_air + by_aerosols + amount.z * ozone_[b];
+        const float depth = by_air + aerosol_extinction * by_aerosols + amount.z * ozone_[b];
         const float passes = std::exp(-depth);
         // The mean transmittance over the step.
         const float mean = depth > 1.0e-4F ? (1.0F - passes) / depth : 1.0F - 0.5F * depth;
@@ -277,7 +252,7 @@ class Atmosphere {
       const auto visit = [&](double radius, double sun, const Bands& air, const Bands& aerosols) {
         const Bands light = sunlight(radius, sun);
         for (std::size_t b = 0; b < band_count; ++b) {
-          const float scattered = air[b] + aerosols[b];
+          const float scattered = air[b] + aerosol_rest * aerosols[b];
           second[b] += each * scattered * light[b] * static_cast<float>(0.25 / pi);
           again[b] += each * scattered;
         }
@@ -313,7 +288,7 @@ double air_phase(double cosine) { return 3.0 / (16.0 * pi) * (1.0 + cosine * cos
 
 // Cornette and Shanks, "Physically Reasonable Analytic Expression for the Single-Scattering Phase Function" (1992).
 double aerosol_phase(double cosine) {
-  constexpr double g = aerosol_anisotropy;
+  constexpr double g = air::aerosol_anisotropy;
   return 3.0 / (8.0 * pi) * (1.0 - g * g) * (1.0 + cosine * cosine) /
          ((2.0 + g * g) * std::pow(1.0 + g * g - 2.0 * g * cosine, 1.5));
 }
@@ -350,14 +325,14 @@ Sky::Sky(const Atmosphere& atmosphere, const dvec3& to_sun) : to_sun_(to_sun), t
                          for (std::size_t b = 0; b < band_count; ++b) {
                            once_by_air[b] += air[b] * light[b];
                            once_by_aerosols[b] += aerosols[b] * light[b];
-                           more[b] += (air[b] + aerosols[b]) * even[b];
+                           more[b] += (air[b] + aerosol_rest * aerosols[b]) * even[b];
                          }
                        });
       table_[k] = {color_of(colors, once_by_air), color_of(colors, once_by_aerosols), color_of(colors, more)};
     }
   });
 
-  sun_irradiance_ = glm::max(color_of(colors, atmosphere.sunlight(ground, to_sun.y)), vec3(0.0F));
+  sun_irradiance_ = glm::max(color_of(colors, atmosphere.sunlight(ground, to_sun.y, 1.0F)), vec3(0.0F));
 
   // Samples uniform over the unit disk below the hemisphere are cosine-weighted.
   constexpr int rings = 64;

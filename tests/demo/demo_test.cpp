@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "demo_options.hpp"
+#include "empty_window.hpp"
 #include "environment_view.hpp"
 #include "given_settings.hpp"
 #include "history.hpp"
@@ -248,6 +249,42 @@ TEST(DemoModel, EnvironmentReplacesOnlyDefaultDaylight) {
   EXPECT_TRUE(same_scene(scene, chosen));
   give_daylight(scene);
   EXPECT_TRUE(same_scene(scene, chosen));
+}
+
+TEST(EmptyWindow, NamesTheKindsOfFiles) {
+  EXPECT_STREQ(kind_of_file("/a/scene.JSON"), "Scene");
+  EXPECT_STREQ(kind_of_file("a.glb"), "Model");
+  EXPECT_STREQ(kind_of_file("a.exr"), "Environment");
+  EXPECT_STREQ(kind_of_file("fluid_####.vdb"), "Volume");
+}
+
+TEST(DemoModel, DuskReplacesOnlyTheDefaultLook) {
+  SceneOptions scene;
+  scene.set_daylight();
+  spell_out_defaults(scene);
+  const SceneOptions day = scene;
+  EXPECT_FALSE(give_day(scene));
+  EXPECT_TRUE(take_dusk(scene));
+  EXPECT_EQ(scene.light.sun_elevation_degrees, 3.0f);
+  EXPECT_EQ(scene.display.tone_map, CUMULET_TONE_MAP_FILMIC);
+  EXPECT_FALSE(take_dusk(scene));
+  EXPECT_TRUE(give_day(scene));
+  EXPECT_TRUE(same_scene(scene, day));
+  for (const bool display : {false, true}) {
+    SceneOptions chosen = day;
+    if (display)
+      chosen.display.exposure_stops = 0.5f;
+    else
+      chosen.light.sun_elevation_degrees = 12.0f;
+    const SceneOptions before = chosen;
+    EXPECT_FALSE(take_dusk(chosen));
+    EXPECT_FALSE(give_day(chosen));
+    EXPECT_TRUE(same_scene(chosen, before));
+  }
+  // The environment is the light.
+  SceneOptions surrounded = day;
+  surrounded.environment = "sky.hdr";
+  EXPECT_FALSE(take_dusk(surrounded));
 }
 
 TEST(Preferences, RoundTripAndTolerateDamage) {

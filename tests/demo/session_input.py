@@ -3,7 +3,7 @@
 import threading
 import time
 
-from demo_session import assert_differ, look, Screen, shot, shown, tab
+from demo_session import assert_differ, assert_drawn, look, Screen, shot, shown, tab
 
 
 def test_keyboard(s):
@@ -47,7 +47,7 @@ def test_outliner(s):
     assert [volumes(name) for name in ("again", "two", "one", "undone")] == [1, 2, 1, 1]
     assert [steps(name) for name in ("again", "two", "one", "undone")] == [1, 2, 3, 1]
     assert s.report("escaped")["chosen"] == "Volume 1", "Escape only closes the menu"
-    width = lambda name: 1100 - s.report(name)["viewport"][2]
+    width = lambda name: 1100 - sum(s.report(name)["viewport"][::2])
     assert [width(name) for name in ("menu", "scaled", "wide")] == [372, 550, 400], "at most half of the window"
 
 
@@ -63,6 +63,41 @@ def test_layout(s):
             report, picture = s.report(f"{name}_{part}"), s.picture(f"{name}_{part}")
             x, y, width, height = report["viewport"]
             assert y > 0 and 0 < picture.width - x - width <= 480 and y + height == picture.height, report["viewport"]
+
+
+def test_tools(s):
+    """The tools at the left edge."""
+    s.play("replay", ["wait loaded", "frames 3", *shot("tools"), 'click "Tool/Rotate"', "frames 3", 'report "rotate.json"',
+                      'click "Tool/Select"', "frames 3", 'report "select.json"', 'drag viewport 0.4 0.5 to viewport 0.6 0.5', "frames 3",
+                      'report "turned.json"', 'click "Tool/Frame all"', "frames 3", "wait loaded", 'report "framed.json"', 'click "Tool/Region"',
+                      "frames 2", "drag viewport 0.25 0.25 to viewport 0.75 0.75", "frames 3", 'report "region.json"', "key n", "frames 3",
+                      *shot("hidden")], "--volume", s.cumulus, size=["--size", "900x600"])
+    tool = lambda name: s.report(name)["tool"]
+    assert (tool("tools"), tool("rotate"), tool("select")) == (1, 2, 0)
+    x, y, width, height = s.report("tools")["viewport"]
+    assert x == 40 and y > 0, "the tools are beside the image"
+    picture = s.picture("tools")
+    assert_drawn(picture, (0, y, 40, 220))
+    camera = lambda name: s.report(name)["scene"]["camera"]
+    assert camera("turned") != camera("tools") and camera("framed") != camera("turned")
+    region = s.report("region")["scene"]["picture"]["region"]
+    assert all(abs(a - b) < 0.02 for a, b in zip(region, [0.25, 0.25, 0.5, 0.5])), region
+    assert s.report("hidden")["viewport"][0] == 0, "N hides the tools and the panel"
+
+
+def test_empty_window(s):
+    """The empty window opens the file dialog and recent files."""
+    s.play("seen", ["wait loaded", "frames 3"], "--volume", s.cumulus)
+    s.play("replay", ["wait loaded", "frames 3", *shot("empty"), 'click "Start/Open"', "frames 3", 'report "dialog.json"', "key escape",
+                      "frames 3", 'click "Start/cumulus.vdb"', "frames 3", "wait loaded", "frames 3", 'report "opened.json"'],
+           size=["--size", "900x600"])
+    report, picture = s.report("empty"), s.picture("empty")
+    blocks = picture.blocks(report["viewport"])
+    across = int(report["viewport"][2]) // 16
+    assert sum(blocks[0]) > sum(blocks[-across]) + 20, f"the background is a gradient: {blocks[0]}, {blocks[-across]}"
+    assert report["recent"] == [str(s.cumulus)] and not report["dialog"], report["recent"]
+    assert s.report("dialog")["dialog"]
+    assert s.report("opened")["grid"] == "density" and not s.report("opened")["dialog"]
 
 
 REFINING = ["--spp", "60000", "--volume"]  # the rendering never finishes

@@ -64,7 +64,7 @@ def test_environment(s):
     # The panel shows its thumbnail, which is three quarters blue.
     def blue(name):
         picture = s.picture(name)
-        n, left = picture.channels, s.report(name)["viewport"][2]
+        n, left = picture.channels, sum(s.report(name)["viewport"][::2])
         pixels = ((row[x * n], row[x * n + 2]) for row in picture.rows for x in range(int(left), picture.width))
         return sum(b > r + 40 for r, b in pixels)
 
@@ -176,7 +176,8 @@ def test_fire(s):
     """A burning volume looks like fire by default, whether opened in the window or by the command line, as in
     cumulet-render."""
     plain, dropped = ["--density-scale", "auto"], f'drop "{s.explosion}"'
-    s.play("replay", [*SETTLE, *shot("cloud"), dropped, *SETTLE, *shot("dropped"), "key ctrl+z", *SETTLE, *shot("undone"),
+    s.play("replay", [*SETTLE, *shot("cloud"), dropped, *SETTLE, *shot("dropped"), 'click "Message/Daylight"', *SETTLE,
+                      'report "day.json"', "key ctrl+z", *SETTLE, "key ctrl+z", *SETTLE, *shot("undone"),
                       "key ctrl+shift+z", *SETTLE, *shot("redone"), f'drop "{s.cumulus}"', *SETTLE, *shot("cloud_again")],
            *plain, "--volume", s.cumulus)
     s.play("named", ["wait loaded", *SETTLE, *shot("named")], *plain, "--volume", s.explosion)
@@ -187,13 +188,21 @@ def test_fire(s):
     burning, burning_report, _ = look(s, "dropped")
     assert medium("dropped")["blackbody"] > 0 and medium("dropped")["albedo"][0] < 0.5, medium("dropped")
     assert burning_report["undo_steps"] == report["undo_steps"] + 1, "the look comes with the file, in one step"
+    daylight = lambda name: (s.report(name)["scene"]["light"], s.report(name)["scene"]["display"])
+    elevation = lambda name: s.report(name)["scene"]["light"]["sun"]["elevation_degrees"]
+    assert elevation("dropped") == 3 and elevation("cloud") == 40, daylight("dropped")
+    assert daylight("dropped")[1]["tone_map"] == "filmic" and daylight("dropped")[1]["exposure_stops"] == 1, daylight("dropped")
+    assert [m["button"] for m in burning_report["messages"] if "dusk" in m["text"]] == ["Daylight"], burning_report["messages"]
+    assert daylight("day") == daylight("cloud") and medium("day") == medium("dropped"), "the button changes the light alone"
+    assert daylight("undone") == daylight("cloud") and daylight("redone") == daylight("dropped") and daylight("cloud_again") == daylight("cloud")
     warmest = max(b[0] - b[2] for b in burning.blocks(area))
     assert warmest > 60, f"fire, no white smoke: {warmest}"
     undone, undone_report, _ = look(s, "undone")
     assert medium("undone") == medium("cloud") and undone_report["undo_steps"] == report["undo_steps"]
     assert_alike(cloud, undone, area)
     assert medium("redone") == medium("dropped")
-    assert_alike(burning, look(s, "redone")[0], area)
+    # Above the message of the first.
+    assert_alike(burning, look(s, "redone")[0], (area[0], area[1], area[2], area[3] - 100))
     assert medium("cloud_again") == medium("cloud"), "a look that nobody chose goes with its file"
     assert s.report("named")["undo_steps"] == 0 and medium("named") == medium("dropped"), medium("named")
     assert medium("said")["blackbody"] == 0 and medium("said")["anisotropy"] == 0.5, medium("said")
