@@ -47,8 +47,8 @@ bool is_possible(const PathFeatures& f) {
   const bool emitting = f.triangles == PathTriangles::emitting;
   if ((f.volume_holdout || f.motion) && !f.grid.several) return false;
   if (!f.anisotropic && (f.ground_or_disk || f.grid.several || f.second_lobe)) return false;
-  if (!f.ground_or_disk && (f.layered != Layered::no || f.has_stages() || f.channels || f.analytic_lights ||
-                            f.separate_volume_aov || f.light_groups > 0))
+  if (!f.ground_or_disk && (f.grid.several || f.layered != Layered::no || f.has_stages() || f.channels ||
+                            f.analytic_lights || f.separate_volume_aov || f.light_groups > 0))
     return false;
   if (!f.has_stages() && (f.extended_bsdf || f.model_holdout)) return false;
   if (f.has_stages() && !emitting && (f.extended_bsdf || f.light_groups > 0)) return false;

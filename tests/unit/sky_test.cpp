@@ -40,7 +40,8 @@ TEST(Sky, IsBlueAboveAndBrighterAtTheHorizon) {
   EXPECT_GT(zenith.g, 1.2F * zenith.r);
   const vec3 low = noon.radiance(direction(2.0, 90.0));
   EXPECT_GT(bright(low), 1.5 * bright(zenith));
-  EXPECT_LT(low.b / low.r, 0.6F * zenith.b / zenith.r);
+  // The path tracer of sky_transport_test gives 0.62 of the zenith's ratio.
+  EXPECT_LT(low.b / low.r, 0.65F * zenith.b / zenith.r);
 }
 
 TEST(Sky, TheSunSetsRed) {
