@@ -204,6 +204,7 @@ FrameResult Viewer::render(const Frame& frame) {
       take_state(frame, shot, limits);
       if (frame.budget_ms >= 0.0) g.upload(shot, limits, deadline);
     });
+    if (!shot.scene) return;  // there is no state to draw
     follow_upload(g);
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
     attempt("cumulet: surfaces only", [&] { g.draw_surfaces_alone(shot, frame); });
