@@ -210,7 +210,8 @@ class Viewer final : private StageHost {
   /// Size of the data that read_accumulation() writes. Both throw Error(invalid_argument) for images with previews and
   /// for debug views.
   std::size_t accumulation_bytes();
-  void read_accumulation(std::span<std::byte> bytes);
+  /// needed: receives the size of the data, also if `bytes` is too small; null: it is not wanted.
+  void read_accumulation(std::span<std::byte> bytes, std::size_t* needed = nullptr);
   /// Throws Error(invalid_argument) for data of another image, and then leaves the image unchanged.
   void restore_accumulation(std::span<const std::byte> bytes);
   Stats stats();

@@ -375,30 +375,30 @@ void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_
 }
 
 void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
-  std::size_t pixels = 0;
+  std::vector<float> linear;
   std::size_t width = 0;
   render::PixelBox box;
-  bool legend = false;
-  bool filtered = false;
-  const DisplaySettings display = display_now();
+  render::Display display;
+  // One image and one state for all of it: other threads may render and change settings.
   in_context([&](Context& g) {
+    const Shot shot = shot_now();
     const render::Picture& picture = g.readable();
     width = picture.size().x;
     box = picture.box();
-    pixels = std::size_t{picture.size().x} * picture.size().y;
-    legend = picture.view() != render::View::shaded;
-    filtered = display.denoise && g.can_denoise(picture);
+    display = shot.display.shown(picture.view() != render::View::shaded);
+    const std::size_t values = 4 * width * picture.size().y;
+    if (rgba == nullptr || count < values)
+      throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(values) + " bytes");
+    linear.resize(values);
+    if (shot.display.denoise && g.can_denoise(picture)) {
+      g.read_denoised(shot, nullptr, linear.data(), values);
+    } else {
+      g.read_linear(shot.display, linear.data(), values);
+    }
+    totals_ = g.totals();
   });
-  if (rgba == nullptr || count < pixels * 4)
-    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(pixels * 4) + " bytes");
-  std::vector<float> linear(pixels * 4);
-  if (filtered) {
-    read_denoised(nullptr, linear.data(), linear.size());
-  } else {
-    read_linear(linear.data(), linear.size());
-  }
-  render::to_display(linear, display.shown(legend), {rgba, pixels * 4});
-  for (std::size_t i = 0; i < pixels; ++i) {
+  render::to_display(linear, display, {rgba, linear.size()});
+  for (std::size_t i = 0; i < linear.size() / 4; ++i) {
     if (!box.holds({i % width, i / width})) std::fill_n(rgba + 4 * i, 4, std::uint8_t{0});
   }
 }
@@ -418,8 +418,11 @@ std::size_t Viewer::accumulation_bytes() {
   return bytes;
 }
 
-void Viewer::read_accumulation(std::span<std::byte> bytes) {
-  in_context([&](Context& g) { g.read_accumulation(bytes); });
+void Viewer::read_accumulation(std::span<std::byte> bytes, std::size_t* needed) {
+  in_context([&](Context& g) {
+    if (needed != nullptr) *needed = g.accumulation_bytes();
+    g.read_accumulation(bytes);
+  });
 }
 
 void Viewer::restore_accumulation(std::span<const std::byte> bytes) {
