@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -276,7 +277,8 @@ class Viewer final : private StageHost {
 
   UpdateCallback update_;
   mutable StateLock state_;
-  std::mutex context_mutex_;  // of gl_; locked before state_
+  std::mutex context_mutex_;                       // of gl_; locked before state_
+  std::chrono::steady_clock::time_point entered_;  // when the running call got context_mutex_
   Log log_;
   Trace trace_;
   mutable ReportedFailures reported_failures_;

@@ -51,6 +51,7 @@ void Viewer::take_frames() {
 
 void Viewer::in_context(const std::function<void(Context&)>& body) {
   const std::scoped_lock lock(context_mutex_);
+  entered_ = Clock::now();
   const auto ended = [this] {
     const StateLock::Held held = hold_state();
     take_frames();
@@ -168,13 +169,13 @@ Viewer::DryRun Viewer::dry_run(const Frame& frame) {
 }
 
 FrameResult Viewer::render(const Frame& frame) {
-  const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   Failures failures;
   // Reset before anything is read, so that later changes notify again.
   update_.reset();
   in_context([&](Context& g) {
+    const auto begun = entered_;  // waiting for calls of other threads does not count against the budget
     // A failure of one part does not prevent the others. It is thrown once, after drawing.
     const auto attempt = [&](const char* name, auto&& part) {
       const gl::DebugGroup group(*g.functions(), name);
@@ -252,8 +253,8 @@ void Viewer::finish_frame(Context& g, FrameResult& result) {
 
 WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   WarmUp result;
-  const render::Deadline deadline = deadline_after(frame.budget_ms);
   in_context([&](Context& g) {
+    const render::Deadline deadline = deadline_after(frame.budget_ms);
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
     dynamic_gl_.update(g);
@@ -290,8 +291,8 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
 
 MapResult Viewer::update_map(const MapRequest& request) {
   MapResult result;
-  const render::Deadline deadline = deadline_after(request.budget_ms);
   in_context([&](Context& g) {
+    const render::Deadline deadline = deadline_after(request.budget_ms);
     const gl::DebugGroup group(*g.functions(), "cumulet: transmittance map");
     const Trace::Span span(trace_, "cumulet: transmittance map");
     result = g.update_map(shot_now(), request, deadline);
