@@ -238,7 +238,7 @@ void Viewer::take_state(const Frame& frame, Shot& shot, Context::UploadLimits& l
 }
 
 void Viewer::finish_frame(Context& g, FrameResult& result) {
-  const std::uint64_t beside_volumes = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
+  const std::uint64_t beside_volumes = g.bytes() - g.read_bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
   const bool gl_due = g.transfers().busy() || dynamic_gl_.is_due(g);
   const StateLock::Held held = hold_state();
   take_frames();
