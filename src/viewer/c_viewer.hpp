@@ -31,7 +31,7 @@ class LastErrors {
     const bool is_new = of_thread_.insert_or_assign(this_thread(), std::move(line)).second;
     if (is_new && of_thread_.size() > max_threads) of_thread_.erase(of_thread_.begin());  // of the oldest thread
   }
-  /// Valid until the calling thread's next set().
+  /// Valid until the calling thread's next set(), unless thousands of later threads have an error.
   [[nodiscard]] const char* get() const {
     const std::scoped_lock lock(mutex_);
     const auto found = of_thread_.find(this_thread());
