@@ -67,19 +67,24 @@ class _Calls:
             return self._changed.wait_for(lambda: self._running == 0, seconds)
 
 
-def _destroy(pointer: Any, calls: _Calls, context: Any, callbacks: Any) -> None:
+def _destroy(pointer: Any, calls: _Calls, gl_lock: Any, context: Any, callbacks: Any) -> None:
     """Destroys a viewer after the running calls of other threads, then its context. The callbacks live until then."""
     api.cumulet_cancel(pointer)
-    if not calls.wait(_support.EXIT_SECONDS):
+    if not gl_lock.acquire(timeout=_support.EXIT_SECONDS):
         return  # a thread still uses it
-    if context is not None and not context.closed:
-        try:
-            context.make_current()
-        except Error:
-            pass  # its GL objects end with the context
-    api.cumulet_destroy(pointer)
-    if context is not None:
-        context.close()
+    try:
+        if not calls.wait(_support.EXIT_SECONDS):
+            return
+        if context is not None and not context.closed:
+            try:
+                context.make_current()
+            except Error:
+                pass  # its GL objects end with the context
+        api.cumulet_destroy(pointer)
+        if context is not None:
+            context.close()
+    finally:
+        gl_lock.release()
     del callbacks
 
 
@@ -153,7 +158,7 @@ class Viewer(_methods.ViewerMethods):
     def _call_gl(self, function: Any, *arguments: Any) -> Any:
         _support.refuse_in_callback(function)
         with self._gl_lock:
-            if self.context is not None:
+            if self.context is not None and self._pointer:  # raises Error if the viewer is closed
                 self.context.make_current()
             result = self._call(function, *arguments)
             if function is api.cumulet_render:
@@ -169,7 +174,7 @@ class Viewer(_methods.ViewerMethods):
             self._running.end()
 
     def _release(self, out: Any) -> None:
-        destroy = functools.partial(_destroy, out, self._running, self.context, self._callbacks)
+        destroy = functools.partial(_destroy, out, self._running, self._gl_lock, self.context, self._callbacks)
         if _support.in_callback():  # where cumulet_destroy does nothing
             _support._postponed.append(destroy)
         else:
@@ -212,8 +217,9 @@ class Viewer(_methods.ViewerMethods):
     # Read-back.
 
     def _read(self, function: Any, floats: int, *arguments: Any) -> memoryview:
-        memory, view = _support.new_array(ctypes.c_float, *self._size, floats)
-        self._call_gl(function, *arguments, memory, len(memory))
+        with self._gl_lock:  # no other thread renders in between
+            memory, view = _support.new_array(ctypes.c_float, *self._size, floats)
+            self._call_gl(function, *arguments, memory, len(memory))
         return view
 
     def read_cryptomatte(self, name: Callable[[api.ObjectKind, int, int], str | None], ranks: int = 6) -> memoryview:
@@ -255,17 +261,19 @@ class Viewer(_methods.ViewerMethods):
         C: cumulet_finish_read.
         """
         info = api.cumulet_read_info()
-        self._call_gl(api.cumulet_finish_read, read, None, 0, ctypes.byref(info))
-        if not info.ready:
-            return None
-        memory, view = _support.new_array(ctypes.c_float, info.height, info.width, info.channels)
-        self._call_gl(api.cumulet_finish_read, read, memory, len(memory), ctypes.byref(info))
+        with self._gl_lock:
+            self._call_gl(api.cumulet_finish_read, read, None, 0, ctypes.byref(info))
+            if not info.ready:
+                return None
+            memory, view = _support.new_array(ctypes.c_float, info.height, info.width, info.channels)
+            self._call_gl(api.cumulet_finish_read, read, memory, len(memory), ctypes.byref(info))
         return view
 
     def read_display(self) -> memoryview:
         """Reads the image as it is displayed, uint8 (height, width, 4), straight alpha. C: cumulet_read_display."""
-        memory, view = _support.new_array(ctypes.c_uint8, *self._size, 4)
-        self._call_gl(api.cumulet_read_display, memory, len(memory))
+        with self._gl_lock:
+            memory, view = _support.new_array(ctypes.c_uint8, *self._size, 4)
+            self._call_gl(api.cumulet_read_display, memory, len(memory))
         return view
 
     def encode_display(self, linear: Any) -> memoryview:
@@ -278,9 +286,10 @@ class Viewer(_methods.ViewerMethods):
     def read_accumulation(self) -> bytes:
         """Reads the samples of the image, for another process. C: cumulet_read_accumulation."""
         size = ctypes.c_size_t()
-        self._call_gl(api.cumulet_read_accumulation, None, ctypes.byref(size))
-        memory = ctypes.create_string_buffer(size.value)
-        self._call_gl(api.cumulet_read_accumulation, memory, ctypes.byref(size))
+        with self._gl_lock:
+            self._call_gl(api.cumulet_read_accumulation, None, ctypes.byref(size))
+            memory = ctypes.create_string_buffer(size.value)
+            self._call_gl(api.cumulet_read_accumulation, memory, ctypes.byref(size))
         return memory.raw[:size.value]
 
     # Pictures.

@@ -35,13 +35,33 @@ void JobList::set_job_log(JobLog* log) {
   for_each([&](ContentKind /*kind*/, JobSource& source) { source.set_job_log(log); });
 }
 
-bool JobList::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
+bool JobList::wait(Until until) const {
   if (!std::ranges::all_of(own_, [&](const Own& own) { return own.source->wait(until); })) return false;
   // Without the lock, so that other threads can make calls.
   std::unique_lock lock(mutex_);
-  const std::vector<std::shared_ptr<JobSource>> players = players_;
+  const std::vector<std::weak_ptr<JobSource>> players(players_.begin(), players_.end());
   lock.unlock();
-  return std::ranges::all_of(players, [&](const auto& player) { return player->wait(until); });
+  return std::ranges::all_of(players, [&](const auto& player) {
+    const std::shared_ptr<JobSource> held = player.lock();
+    return !held || wait_while_listed(*held, until);
+  });
+}
+
+// Not the whole time at once: a player that is dropped meanwhile ends only when nobody holds it.
+bool JobList::wait_while_listed(const JobSource& player, Until until) const {
+  using Clock = std::chrono::steady_clock;
+  constexpr auto step = std::chrono::milliseconds(20);
+  const auto is_listed = [&] {
+    const std::scoped_lock lock(mutex_);
+    return std::ranges::any_of(players_, [&](const auto& listed) { return listed.get() == &player; });
+  };
+  while (is_listed()) {
+    const Clock::time_point next = Clock::now() + step;
+    const bool is_last = until && *until <= next;
+    if (player.wait(is_last ? *until : next)) return true;
+    if (is_last) return false;
+  }
+  return true;
 }
 
 bool JobList::busy() const {

@@ -38,8 +38,10 @@ class JobList {
   void cancel();
   void rebuild();
   void set_job_log(JobLog* log);
-  /// Waits for all sources, until the given time. Returns true unless the time ran out.
-  bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  using Until = std::optional<std::chrono::steady_clock::time_point>;
+  /// Waits for all sources, until the given time. Returns true unless the time ran out. Players that are replaced
+  /// meanwhile are not waited for.
+  bool wait(Until until) const;
 
   /// True if a source is busy.
   [[nodiscard]] bool busy() const;
@@ -62,6 +64,8 @@ class JobList {
   // Calls `visit` with kind and source of all, with the lock.
   template <class Visit>
   void for_each(Visit&& visit) const;
+  // Waits for a player until it is replaced.
+  bool wait_while_listed(const JobSource& player, Until until) const;
 
   JobContext context_;
   std::vector<Own> own_;

@@ -2,6 +2,15 @@
 
 namespace cumulet::render {
 
+namespace {
+
+// At least the alignment of texel buffers on all drivers, which copy to others by waiting.
+constexpr std::size_t copy_alignment = 256;
+
+std::size_t aligned(std::size_t bytes) { return (bytes + copy_alignment - 1) / copy_alignment * copy_alignment; }
+
+}  // namespace
+
 FilmReader::Copied::Copied(const gl::Functions& gl, const FilmValues& values, float* to) {
   const auto& sources = values.sources();
   memory_.resize(sources.size());
@@ -56,7 +65,7 @@ Totals FilmReader::totals(const Picture& picture) const {
 }
 
 PendingRead::PendingRead(const gl::FunctionsPtr& gl, FilmValues values) : values_(std::move(values)) {
-  for (const FilmValues::Source& source : values_.sources()) bytes_ += values_.bytes_of(source);
+  for (const FilmValues::Source& source : values_.sources()) bytes_ += aligned(values_.bytes_of(source));
   buffer_ = gl::ReadBack::unfilled(gl, bytes_, "creating the buffer to read the image back");
   // What dispatches have written is copied.
   gl::memory_barrier(*gl, GL_TEXTURE_UPDATE_BARRIER_BIT);
@@ -64,7 +73,7 @@ PendingRead::PendingRead(const gl::FunctionsPtr& gl, FilmValues values) : values
   std::size_t offset = 0;
   for (const FilmValues::Source& source : values_.sources()) {
     copy_source(*gl, values_, source, reinterpret_cast<void*>(offset));
-    offset += values_.bytes_of(source);
+    offset += aligned(values_.bytes_of(source));
   }
   gl->BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   fence_ = gl::Fence(gl);
@@ -76,7 +85,7 @@ void PendingRead::take(float* to) const {
   const std::byte* at = buffer_.data();
   for (const FilmValues::Source& source : values_.sources()) {
     copies.push_back(at);
-    at += values_.bytes_of(source);
+    at += aligned(values_.bytes_of(source));
   }
   values_.make(copies, to);
 }

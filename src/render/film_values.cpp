@@ -23,10 +23,8 @@ Source counts_of(const Picture& picture) {
           .texel_bytes = sizeof(glm::uvec2)};
 }
 
-Source rgb_of(const Picture& picture, const FilmLayer& layer) {
-  return {.texture = picture.film().texture(layer), .format = GL_RGB, .texel_bytes = sizeof(glm::vec3)};
-}
-
+// Also for colors without alpha: drivers copy four floats to a pixel pack buffer on the GPU, but wait and convert
+// three.
 Source rgba_of(const Picture& picture, const FilmLayer& layer) { return {.texture = picture.film().texture(layer)}; }
 
 template <class Texel>
@@ -47,7 +45,7 @@ void make_means(Copies copies, std::size_t pixels, float* values) {
   if (copies.size() < 3) return;
   const float* background = texels<float>(copies, 2);
   for (std::size_t i = 0; i < pixels; ++i) {
-    for (std::size_t c = 0; c < 3; ++c) values[4 * i + c] += background[3 * i + c];
+    for (std::size_t c = 0; c < 3; ++c) values[4 * i + c] += background[4 * i + c];
   }
 }
 
@@ -56,7 +54,8 @@ void make_light_group(Copies copies, std::size_t pixels, float* values) {
   const auto* counts = texels<glm::uvec2>(copies, 0);
   for (std::size_t i = 0; i < 3 * pixels; ++i) {
     float sum = 0.0F;
-    for (std::size_t slice = 1; slice < copies.size(); ++slice) sum += texels<float>(copies, slice)[i];
+    for (std::size_t slice = 1; slice < copies.size(); ++slice)
+      sum += texels<float>(copies, slice)[4 * (i / 3) + i % 3];
     values[i] = sum / static_cast<float>(std::max(1U, counts[i / 3].x));
   }
 }
@@ -81,13 +80,13 @@ void make_drawn(Copies copies, std::size_t pixels, float* values) {
 
 }  // namespace
 
-FilmValues::FilmValues(glm::uvec2 size, std::size_t channels, std::vector<Source> sources, std::size_t in_place,
-                       Make make)
+FilmValues::FilmValues(glm::uvec2 size, std::size_t channels, std::vector<Source> sources,
+                       std::optional<std::size_t> in_place, Make make)
     : size_(size), channels_(channels), sources_(std::move(sources)), in_place_(in_place), make_(std::move(make)) {}
 
 FilmValues FilmValues::means(const Picture& picture, bool with_background) {
   std::vector<Source> sources{counts_of(picture), rgba_of(picture, film_layers::radiance)};
-  if (with_background) sources.push_back(rgb_of(picture, film_layers::background));
+  if (with_background) sources.push_back(rgba_of(picture, film_layers::background));
   return {picture.size(), 4, std::move(sources), 1, make_means};
 }
 
@@ -99,7 +98,7 @@ FilmValues FilmValues::errors(const Picture& picture) {
   Source squares = rgba_of(picture, film_layers::moments);
   squares.format = GL_RED;
   squares.texel_bytes = sizeof(float);
-  std::vector<Source> sources{counts_of(picture), rgb_of(picture, film_layers::background), squares,
+  std::vector<Source> sources{counts_of(picture), rgba_of(picture, film_layers::background), squares,
                               rgba_of(picture, film_layers::radiance)};
   return {picture.size(), 1, std::move(sources), 2, make_errors};
 }
@@ -108,9 +107,8 @@ FilmValues FilmValues::light_group(const Picture& picture, std::uint32_t group, 
   const std::uint32_t groups = picture.light_groups();
   std::vector<Source> sources{counts_of(picture)};
   const auto add = [&](std::uint32_t slice) {
-    Source source = rgb_of(picture, film_layers::light_groups(groups));
+    Source source = rgba_of(picture, film_layers::light_groups(groups));
     source.slice = slice;
-    source.is_slice = true;
     sources.push_back(source);
   };
   add(group);
@@ -118,7 +116,7 @@ FilmValues FilmValues::light_group(const Picture& picture, std::uint32_t group, 
   const auto is_of = [&](std::uint32_t other) { return group == (other < groups ? other : 0); };
   if (with_background && is_of(integrator.sky_group)) add(groups);
   if (with_background && is_of(integrator.sun_group)) add(groups + 1);
-  return {picture.size(), 3, std::move(sources), 1, make_light_group};
+  return {picture.size(), 3, std::move(sources), std::nullopt, make_light_group};
 }
 
 FilmValues FilmValues::drawn(glm::uvec2 size, GLuint transparent, GLuint opaque) {
@@ -128,20 +126,24 @@ FilmValues FilmValues::drawn(glm::uvec2 size, GLuint transparent, GLuint opaque)
 }
 
 void copy_source(const gl::Functions& gl, const FilmValues& values, const FilmValues::Source& source, void* to) {
-  const auto bytes = static_cast<GLsizei>(values.bytes_of(source));
+  // In bands of rows: GL takes sizes below 2^31 bytes.
   const glm::ivec2 size(values.size());
-  if (source.is_slice) {
-    gl.GetTextureSubImage(source.texture, 0, 0, 0, static_cast<GLint>(source.slice), size.x, size.y, 1, source.format,
-                          source.type, bytes, to);
-  } else {
-    gl.GetTextureImage(source.texture, 0, source.format, source.type, bytes, to);
+  const std::size_t row_bytes = std::size_t{values.size().x} * source.texel_bytes;
+  const std::size_t most = std::numeric_limits<GLsizei>::max() / std::max<std::size_t>(row_bytes, 1);
+  const int rows = static_cast<int>(std::clamp<std::size_t>(most, 1, std::max(values.size().y, 1U)));
+  for (int y = 0; y < size.y; y += rows) {
+    const int height = std::min(rows, size.y - y);
+    gl.GetTextureSubImage(
+        source.texture, 0, 0, y, static_cast<GLint>(source.slice), size.x, height, 1, source.format, source.type,
+        static_cast<GLsizei>(static_cast<std::size_t>(height) * row_bytes),
+        reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(to) + static_cast<std::size_t>(y) * row_bytes));
   }
 }
 
 void for_each_error(FilmValues::Copies copies, std::size_t pixels,
                     const std::function<void(const PixelError& error)>& visit) {
   const auto* counts = texels<glm::uvec2>(copies, 0);
-  const auto* background = texels<glm::vec3>(copies, 1);
+  const auto* background = texels<glm::vec4>(copies, 1);
   const auto* squares = texels<float>(copies, 2);
   const auto* sums = texels<glm::vec4>(copies, 3);
   for (std::size_t i = 0; i < pixels; ++i) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,7 +24,6 @@ class FilmValues {
     GLenum type = GL_FLOAT;
     std::size_t texel_bytes = 16;
     std::uint32_t slice = 0;  ///< of an array texture
-    bool is_slice = false;
   };
   /// Copies of the sources, in their order.
   using Copies = std::span<const std::byte* const>;
@@ -48,19 +48,20 @@ class FilmValues {
   [[nodiscard]] std::size_t count() const { return pixels() * channels_; }
   [[nodiscard]] const std::vector<Source>& sources() const { return sources_; }
   [[nodiscard]] std::size_t bytes_of(const Source& source) const { return pixels() * source.texel_bytes; }
-  /// Number of the source with the format of the values, whose copy may be in the memory for the values.
-  [[nodiscard]] std::size_t in_place() const { return in_place_; }
+  /// Number of the source with the format of the values, whose copy may be in the memory for the values; nullopt: none.
+  [[nodiscard]] std::optional<std::size_t> in_place() const { return in_place_; }
   /// Writes count() floats.
   void make(Copies copies, float* values) const { make_(copies, pixels(), values); }
 
  private:
   using Make = std::function<void(Copies copies, std::size_t pixels, float* values)>;
-  FilmValues(glm::uvec2 size, std::size_t channels, std::vector<Source> sources, std::size_t in_place, Make make);
+  FilmValues(glm::uvec2 size, std::size_t channels, std::vector<Source> sources, std::optional<std::size_t> in_place,
+             Make make);
 
   glm::uvec2 size_;
   std::size_t channels_;
   std::vector<Source> sources_;
-  std::size_t in_place_;
+  std::optional<std::size_t> in_place_;
   Make make_;
 };
 

@@ -732,9 +732,11 @@ cumulet_status cumulet_measure_noise(cumulet_viewer* viewer, double* noise) {
 cumulet_status cumulet_read_accumulation(cumulet_viewer* viewer, void* bytes, size_t* size) {
   return guarded(viewer, [&](core::Viewer& v) {
     require(size != nullptr, "size is NULL");
-    const std::size_t room = bytes == nullptr ? 0 : *size;
-    *size = v.accumulation_bytes();
-    if (bytes != nullptr) v.read_accumulation({static_cast<std::byte*>(bytes), room});
+    if (bytes == nullptr) {
+      *size = v.accumulation_bytes();
+    } else {
+      v.read_accumulation({static_cast<std::byte*>(bytes), *size}, size);
+    }
   });
 }
 

@@ -4,11 +4,13 @@
 
 #include <unistd.h>
 
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "viewer/c_handles.hpp"
@@ -22,18 +24,31 @@ class LastErrors {
  public:
   void set(std::string line) {
     const std::scoped_lock lock(mutex_);
-    of_thread_[std::this_thread::get_id()].swap(line);
+    if (line.empty()) {  // most threads have no error, so that the map stays small
+      of_thread_.erase(this_thread());
+      return;
+    }
+    const bool is_new = of_thread_.insert_or_assign(this_thread(), std::move(line)).second;
+    if (is_new && of_thread_.size() > max_threads) of_thread_.erase(of_thread_.begin());  // of the oldest thread
   }
-  /// Valid until the calling thread's next set().
+  /// Valid until the calling thread's next set(), unless thousands of later threads have an error.
   [[nodiscard]] const char* get() const {
     const std::scoped_lock lock(mutex_);
-    const auto found = of_thread_.find(std::this_thread::get_id());
+    const auto found = of_thread_.find(this_thread());
     return found == of_thread_.end() ? "" : found->second.c_str();
   }
 
  private:
+  static constexpr std::size_t max_threads = 4096;
+  // Unlike std::thread::id, no later thread has the same.
+  static std::uint64_t this_thread() {
+    static std::atomic<std::uint64_t> last = 0;
+    thread_local const std::uint64_t number = ++last;
+    return number;
+  }
+
   mutable std::mutex mutex_;
-  std::map<std::thread::id, std::string> of_thread_;
+  std::map<std::uint64_t, std::string> of_thread_;
 };
 
 }  // namespace cumulet::c_abi

@@ -61,7 +61,7 @@ void Context::upload(const Shot& shot, const UploadLimits& limits, render::Deadl
   progressive_.tracer().order();
   if (scene_.data() != nullptr && shot.scene->volumes.empty()) progressive_.reset();
   const bool raster = shot.sampling.options.preview || shot.surfaces.light == SurfaceLight::none;
-  const std::uint64_t others = bytes() - scene_.data_bytes() - scene_.other_bytes();
+  const std::uint64_t others = bytes() - scene_.data_bytes() - scene_.other_bytes() - read_bytes();
   const std::uint64_t room = limits.max_bytes - std::min(limits.max_bytes, others);
   const auto update = [&] { scene_.update(*shot.scene, {raster, shot.settings, limits.page_texels, room}, deadline); };
   if (scene_.uploading()) {
@@ -431,13 +431,17 @@ render::PassSeconds Context::pass_seconds() const {
   return seconds;
 }
 
+std::uint64_t Context::read_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const auto& [number, read] : reads_) bytes += read.pending.bytes();
+  return bytes;
+}
+
 std::uint64_t Context::bytes() const {
   const glm::u64vec2 depth_size = host_depth_.size();
   std::uint64_t maps = 0;
   for (const auto& [slot, map] : maps_) maps += map.bytes();
-  std::uint64_t reads = 0;
-  for (const auto& [number, read] : reads_) reads += read.pending.bytes();
-  return scene_.data_bytes() + scene_.other_bytes() + maps + reads + progressive_.bytes() + empty_.bytes() +
+  return scene_.data_bytes() + scene_.other_bytes() + maps + read_bytes() + progressive_.bytes() + empty_.bytes() +
          compositor_.bytes() + transfers_.bytes() + memories_->bytes() + (target_ ? target_.of().bytes() : 0) +
          depth_size.x * depth_size.y * host_depth_.layers() * 4;
 }

@@ -161,6 +161,8 @@ class Context {
   [[nodiscard]] render::PassSeconds pass_seconds() const;
   /// GPU memory in bytes.
   [[nodiscard]] std::uint64_t bytes() const;
+  /// Those of pending reads. They are short-lived: budgets of volumes, and thus images, do not depend on them.
+  [[nodiscard]] std::uint64_t read_bytes() const;
 
  private:
   // State that determines the drawn image.

@@ -12,7 +12,8 @@ namespace cumulet::viewer {
 
 /// The lock of the state that settings and input change. Functions of GL hold it only while they take or update that
 /// state. While a thread holds it, its log lines and notifications are collected; they reach the host after the
-/// release, so that no such callback runs under the lock. All calls are safe from any thread.
+/// release, so that no such callback of this viewer runs under the lock. The update callback of another viewer may, if
+/// the viewers share a camera. All calls are safe from any thread.
 class StateLock {
  public:
   /// update: calls the host's update callback.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -210,7 +211,8 @@ class Viewer final : private StageHost {
   /// Size of the data that read_accumulation() writes. Both throw Error(invalid_argument) for images with previews and
   /// for debug views.
   std::size_t accumulation_bytes();
-  void read_accumulation(std::span<std::byte> bytes);
+  /// needed: receives the size of the data, also if `bytes` is too small; null: it is not wanted.
+  void read_accumulation(std::span<std::byte> bytes, std::size_t* needed = nullptr);
   /// Throws Error(invalid_argument) for data of another image, and then leaves the image unchanged.
   void restore_accumulation(std::span<const std::byte> bytes);
   Stats stats();
@@ -275,7 +277,8 @@ class Viewer final : private StageHost {
 
   UpdateCallback update_;
   mutable StateLock state_;
-  std::mutex context_mutex_;  // of gl_; locked before state_
+  std::mutex context_mutex_;                       // of gl_; locked before state_
+  std::chrono::steady_clock::time_point entered_;  // when the running call got context_mutex_
   Log log_;
   Trace trace_;
   mutable ReportedFailures reported_failures_;

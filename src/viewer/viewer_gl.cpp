@@ -51,6 +51,7 @@ void Viewer::take_frames() {
 
 void Viewer::in_context(const std::function<void(Context&)>& body) {
   const std::scoped_lock lock(context_mutex_);
+  entered_ = Clock::now();
   const auto ended = [this] {
     const StateLock::Held held = hold_state();
     take_frames();
@@ -168,13 +169,13 @@ Viewer::DryRun Viewer::dry_run(const Frame& frame) {
 }
 
 FrameResult Viewer::render(const Frame& frame) {
-  const auto begun = Clock::now();
   const Trace::Span frame_span(trace_, "frame");
   FrameResult result;
   Failures failures;
   // Reset before anything is read, so that later changes notify again.
   update_.reset();
   in_context([&](Context& g) {
+    const auto begun = entered_;  // waiting for calls of other threads does not count against the budget
     // A failure of one part does not prevent the others. It is thrown once, after drawing.
     const auto attempt = [&](const char* name, auto&& part) {
       const gl::DebugGroup group(*g.functions(), name);
@@ -204,6 +205,7 @@ FrameResult Viewer::render(const Frame& frame) {
       take_state(frame, shot, limits);
       if (frame.budget_ms >= 0.0) g.upload(shot, limits, deadline);
     });
+    if (!shot.scene) return;  // there is no state to draw
     follow_upload(g);
     if (frame.budget_ms >= 0.0) attempt("cumulet: trace", [&] { g.trace(shot, frame, deadline); });
     attempt("cumulet: surfaces only", [&] { g.draw_surfaces_alone(shot, frame); });
@@ -236,7 +238,7 @@ void Viewer::take_state(const Frame& frame, Shot& shot, Context::UploadLimits& l
 }
 
 void Viewer::finish_frame(Context& g, FrameResult& result) {
-  const std::uint64_t beside_volumes = g.bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
+  const std::uint64_t beside_volumes = g.bytes() - g.read_bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
   const bool gl_due = g.transfers().busy() || dynamic_gl_.is_due(g);
   const StateLock::Held held = hold_state();
   take_frames();
@@ -251,8 +253,8 @@ void Viewer::finish_frame(Context& g, FrameResult& result) {
 
 WarmUp Viewer::warm_up(const Frame& frame, bool all) {
   WarmUp result;
-  const render::Deadline deadline = deadline_after(frame.budget_ms);
   in_context([&](Context& g) {
+    const render::Deadline deadline = deadline_after(frame.budget_ms);
     const gl::DebugGroup group(*g.functions(), "cumulet: warm-up");
     const Trace::Span span(trace_, "cumulet: warm-up");
     dynamic_gl_.update(g);
@@ -289,8 +291,8 @@ void Viewer::set_live_gl(std::shared_ptr<Live> live, const render::GlState& stat
 
 MapResult Viewer::update_map(const MapRequest& request) {
   MapResult result;
-  const render::Deadline deadline = deadline_after(request.budget_ms);
   in_context([&](Context& g) {
+    const render::Deadline deadline = deadline_after(request.budget_ms);
     const gl::DebugGroup group(*g.functions(), "cumulet: transmittance map");
     const Trace::Span span(trace_, "cumulet: transmittance map");
     result = g.update_map(shot_now(), request, deadline);
@@ -374,30 +376,30 @@ void Viewer::encode_display(std::span<const float> linear, std::span<std::uint8_
 }
 
 void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
-  std::size_t pixels = 0;
+  std::vector<float> linear;
   std::size_t width = 0;
   render::PixelBox box;
-  bool legend = false;
-  bool filtered = false;
-  const DisplaySettings display = display_now();
+  render::Display display;
+  // One image and one state for all of it: other threads may render and change settings.
   in_context([&](Context& g) {
+    const Shot shot = shot_now();
     const render::Picture& picture = g.readable();
     width = picture.size().x;
     box = picture.box();
-    pixels = std::size_t{picture.size().x} * picture.size().y;
-    legend = picture.view() != render::View::shaded;
-    filtered = display.denoise && g.can_denoise(picture);
+    display = shot.display.shown(picture.view() != render::View::shaded);
+    const std::size_t values = 4 * width * picture.size().y;
+    if (rgba == nullptr || count < values)
+      throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(values) + " bytes");
+    linear.resize(values);
+    if (shot.display.denoise && g.can_denoise(picture)) {
+      g.read_denoised(shot, nullptr, linear.data(), values);
+    } else {
+      g.read_linear(shot.display, linear.data(), values);
+    }
+    totals_ = g.totals();
   });
-  if (rgba == nullptr || count < pixels * 4)
-    throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(pixels * 4) + " bytes");
-  std::vector<float> linear(pixels * 4);
-  if (filtered) {
-    read_denoised(nullptr, linear.data(), linear.size());
-  } else {
-    read_linear(linear.data(), linear.size());
-  }
-  render::to_display(linear, display.shown(legend), {rgba, pixels * 4});
-  for (std::size_t i = 0; i < pixels; ++i) {
+  render::to_display(linear, display, {rgba, linear.size()});
+  for (std::size_t i = 0; i < linear.size() / 4; ++i) {
     if (!box.holds({i % width, i / width})) std::fill_n(rgba + 4 * i, 4, std::uint8_t{0});
   }
 }
@@ -417,8 +419,11 @@ std::size_t Viewer::accumulation_bytes() {
   return bytes;
 }
 
-void Viewer::read_accumulation(std::span<std::byte> bytes) {
-  in_context([&](Context& g) { g.read_accumulation(bytes); });
+void Viewer::read_accumulation(std::span<std::byte> bytes, std::size_t* needed) {
+  in_context([&](Context& g) {
+    if (needed != nullptr) *needed = g.accumulation_bytes();
+    g.read_accumulation(bytes);
+  });
 }
 
 void Viewer::restore_accumulation(std::span<const std::byte> bytes) {

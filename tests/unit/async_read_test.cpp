@@ -222,7 +222,7 @@ TEST_P(AsyncRead, ReadsEnd) {
   make();
   const std::uint64_t without = gl_bytes();
   const std::uint64_t read = begin(CUMULET_READ_LINEAR);
-  EXPECT_EQ(gl_bytes(), without + pixel_count * (16 + 12 + 8));
+  EXPECT_EQ(gl_bytes(), without + pixel_count * (16 + 16 + 8));
   auto info = make_desc<cumulet_read_info>();
   while (info.ready == 0)  // a look does not end it
     ASSERT_EQ(cumulet_finish_read(v_, read, nullptr, 0, &info), CUMULET_OK);

@@ -4039,8 +4039,10 @@ typedef struct cumulet_read_info {
  * - The values are those of the image at this call, with the display settings of this call. Later frames, settings and
  *   content do not change them. Of a sample that is still being traced, some pixels may have their value already.
  * - Display values: pass those of CUMULET_READ_LINEAR to cumulet_encode_display, on any thread.
- * - At most 16 reads may be begun and not finished. Each holds 24 to 48 bytes per pixel (more for light groups) of GL
- *   memory, counted in cumulet_stats.gl_bytes. Detaching and the loss of the context end all reads.
+ * - At most 16 reads may be begun and not finished. Each holds 16 to 56 bytes per pixel of GL memory, counted in
+ *   cumulet_stats.gl_bytes, but not in cumulet_limits_desc.gl_bytes. Detaching and the loss of the context end all
+ *   reads.
+ * - The first read of an image with rasterized surfaces may compile a shader in this call, unless a frame was drawn.
  *
  * Threads: any thread with the context.
  *

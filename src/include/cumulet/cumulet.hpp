@@ -1654,7 +1654,9 @@ class Viewer {
   /// Fills `values` if the read is ready, which ends it. An empty span: the read is only looked at.
   [[nodiscard]] Result<ReadInfo> finish_read(std::uint64_t read, std::span<float> values) noexcept {
     auto c = detail::sized<cumulet_read_info>();
-    if (auto done = result(cumulet_finish_read(handle(), read, values.data(), values.size(), &c)); !done) {
+    if (auto done =
+            result(cumulet_finish_read(handle(), read, values.empty() ? nullptr : values.data(), values.size(), &c));
+        !done) {
       return done.error();
     }
     return ReadInfo::of(c);
