@@ -533,7 +533,9 @@ class Studio {
       lut = cumulet::demo::read_cube_lut(options.lut);
       lut.shaper = options.lut_shaper;
     } else if (!options.ocio.config.empty()) {
-      lut = cumulet::demo::bake_ocio_view(options.ocio);
+      std::string note;
+      lut = cumulet::demo::bake_ocio_view(options.ocio, &note);
+      if (!note.empty()) cumulet::demo::Messages::print(&messages_, CUMULET_LOG_INFO, note.c_str());
     } else {
       return;
     }

@@ -661,8 +661,8 @@ void add_ocio_options(CLI::App& app, const char* group, OcioView& view) {
            "Display of --ocio (default: that of the configuration)");
   add_text(app, group, "--ocio-view", "NAME", view.view, "View of --ocio (default: that of the display)");
   add_text(app, group, "--ocio-input", "NAME", view.input,
-           "Color space of --ocio that is linear Rec. 709 (default: found by its name, else by the role "
-           "aces_interchange)");
+           "Color space of --ocio that is linear Rec. 709 (default: found by its name or by the role "
+           "aces_interchange, and printed)");
 }
 
 void check_ocio_options(const OcioView& view) {
