@@ -30,7 +30,8 @@ class SharedViewer final : public QObject {
 /// A QML item that shows one Cumulet viewer.
 ///
 /// All calls of the viewer are made by the thread that renders, which has the GL context. The item keeps input and
-/// settings until synchronize(), during which Qt blocks the item's thread.
+/// settings until synchronize(), during which Qt blocks the item's thread: the viewer then shows the same state as the
+/// other items of the frame. (Calls without GL could also be made at once.)
 class CumuletView : public QQuickFramebufferObject {
   Q_PROPERTY(QUrl source READ source WRITE set_source NOTIFY source_changed)
   Q_PROPERTY(int samples READ samples WRITE set_samples NOTIFY samples_changed)
