@@ -340,7 +340,8 @@ FileKind kind_of(const std::string& path) {
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
   throw UsageError(in_quotes(path) +
-                   " is not a volume (.vdb, .nvdb, .nrrd, .raw, .tif), glTF file (.gltf, .glb) or scene (.json)");
+                   " is not a volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), glTF file (.gltf, .glb) or scene "
+                   "(.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
