@@ -344,11 +344,14 @@ void App::accept(const Answer& answer) {
 }
 
 void App::take_look(const cumulet_medium_desc& look) {
+  // Another grid of a fire keeps the light that the user chose for the first one.
+  const bool burned = look_ && !demo::is_unsaid(*look_);
   look_ = look;
   model_.scene.medium = look;
   const bool burns = !demo::is_unsaid(look);
   if (!burns) give_day(model_.scene);
-  if (burns && take_dusk(model_.scene))
+  // A view of OpenColorIO replaces the tone map.
+  if (burns && !burned && options_.viewer.ocio.config.empty() && take_dusk(model_.scene))
     show_message(
         model_, false, "The volume burns: dusk light and the filmic tone map", now_,
         MessageButton{"Daylight", "Sets the default daylight and tone map. Ctrl+Z undoes that.", {Action::daylight}});

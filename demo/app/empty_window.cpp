@@ -74,8 +74,9 @@ void draw_empty_window(Ui& ui, const Rectangle& view, const Model& model, std::v
   if (ImGui::Button("Open...", {-1.0f, 0.0f})) commands.push_back({Action::open_dialog});
   ui.remember("Start/Open", "Opens a volume, a model, an environment map or a scene (Ctrl+O).");
   ImGui::Spacing();
-  constexpr std::array lines{"Drop a volume (.vdb, .nvdb), surfaces (.gltf, .glb) or a scene (.json) here,",
-                             "and an environment (.hdr, .exr) to light it,", "or press Ctrl+O.  F1 shows all keys."};
+  constexpr std::array lines{"Drop a volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif),",
+                             "surfaces (.gltf, .glb), an environment (.hdr, .exr) or a scene (.json) here,",
+                             "or press Ctrl+O.  F1 shows all keys."};
   for (const char* line : lines) draw_centered(line);
   ImGui::PopTextWrapPos();
   draw_recent(ui, model, commands);

@@ -25,8 +25,9 @@ constexpr double max_autosave = 3600.0;
 
 std::string absolute(const std::string& path) {
   std::error_code error;
-  const fs::path there = fs::absolute(fs::path(path), error);
-  return error ? "" : there.lexically_normal().string();
+  const fs::path there = fs::absolute(fs::path(path), error).lexically_normal();
+  // A folder of slices may have a slash at its end.
+  return error ? "" : (there.has_filename() ? there : there.parent_path()).string();
 }
 
 bool is_scene(const std::string& path) { return fs::path(path).extension() == ".json"; }

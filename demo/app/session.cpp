@@ -72,7 +72,9 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
   viewer_.reset(viewer);
   if (!setup.ocio.config.empty()) {
-    const DisplayLut lut = bake_ocio_view(setup.ocio);
+    std::string note;
+    const DisplayLut lut = bake_ocio_view(setup.ocio, &note);
+    if (!note.empty()) on_log(shared_.get(), CUMULET_LOG_INFO, note.c_str());
     const cumulet_display_lut_desc lut_desc = desc_of(lut);
     if (cumulet_set_display_lut(viewer_.get(), &lut_desc) != CUMULET_OK)
       throw std::runtime_error(cumulet_last_error(viewer_.get()));

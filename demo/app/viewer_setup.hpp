@@ -5,7 +5,7 @@
 
 namespace cumulet::demo {
 
-/// What each viewer of the program is created with.
+/// Settings with which each viewer is created.
 struct ViewerSetup {
   std::string shader_cache;  // folder; empty: none
   std::string shaders;       // folder; empty: the library's

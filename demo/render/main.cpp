@@ -528,15 +528,12 @@ class Studio {
   }
 
   void set_display_lut(const RenderOptions& options) {
-    cumulet::demo::DisplayLut lut;
-    if (!options.lut.empty()) {
-      lut = cumulet::demo::read_cube_lut(options.lut);
-      lut.shaper = options.lut_shaper;
-    } else if (!options.ocio.config.empty()) {
-      lut = cumulet::demo::bake_ocio_view(options.ocio);
-    } else {
-      return;
-    }
+    if (options.lut.empty() && options.ocio.config.empty()) return;
+    std::string note;
+    cumulet::demo::DisplayLut lut = options.lut.empty() ? cumulet::demo::bake_ocio_view(options.ocio, &note)
+                                                        : cumulet::demo::read_cube_lut(options.lut);
+    if (!options.lut.empty()) lut.shaper = options.lut_shaper;
+    if (!note.empty()) cumulet::demo::Messages::print(&messages_, CUMULET_LOG_INFO, note.c_str());
     const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut);
     check(viewer_, cumulet_set_display_lut(viewer_.get(), &desc));
   }

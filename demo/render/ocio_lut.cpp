@@ -29,8 +29,9 @@ constexpr std::array rec709_names = {"Linear Rec.709 (sRGB)",
                                      "Linear sRGB",
                                      "srgb_linear",
                                      "Utility - Linear - Rec.709",
-                                     "Utility - Linear - sRGB",
-                                     "linear"};
+                                     "Utility - Linear - sRGB"};
+// Some configurations, of ACES for example, give this name to other primaries.
+constexpr const char* unsure_name = "linear";
 
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
 
@@ -83,18 +84,23 @@ std::string input_of(const ocio::Config& config, const OcioView& view, ocio::Gro
   }
   for (const char* name : rec709_names)
     if (config.getColorSpace(name) != nullptr) return name;
-  if (!config.hasRole(ocio::ROLE_INTERCHANGE_SCENE))
-    throw std::runtime_error("it names no color space of linear Rec. 709: choose one by --ocio-input");
-  append_rec709_to_aces(group);
-  return ocio::ROLE_INTERCHANGE_SCENE;
+  if (config.hasRole(ocio::ROLE_INTERCHANGE_SCENE)) {
+    append_rec709_to_aces(group);
+    return ocio::ROLE_INTERCHANGE_SCENE;
+  }
+  if (config.getColorSpace(unsure_name) != nullptr) return unsure_name;
+  throw std::runtime_error("it names no color space of linear Rec. 709: choose one by --ocio-input");
 }
 
-ocio::ConstCPUProcessorRcPtr processor_of(const OcioView& view) {
+ocio::ConstCPUProcessorRcPtr processor_of(const OcioView& view, std::string* note) {
   const ocio::ConstConfigRcPtr config = ocio::Config::CreateFromFile(view.config.c_str());
   const std::string display = display_of(*config, view);
   const auto group = ocio::GroupTransform::Create();
   const auto to_display = ocio::DisplayViewTransform::Create();
-  to_display->setSrc(input_of(*config, view, *group).c_str());
+  const std::string input = input_of(*config, view, *group);
+  if (note != nullptr && view.input.empty())
+    *note = "--ocio " + view.config + ": radiance enters by the color space " + quoted(input);
+  to_display->setSrc(input.c_str());
   to_display->setDisplay(display.c_str());
   to_display->setView(view_of(*config, display, view).c_str());
   group->appendTransform(to_display);
@@ -103,7 +109,7 @@ ocio::ConstCPUProcessorRcPtr processor_of(const OcioView& view) {
 
 }  // namespace
 
-DisplayLut bake_ocio_view(const OcioView& view) {
+DisplayLut bake_ocio_view(const OcioView& view, std::string* note) {
   DisplayLut lut{.size = points,
                  .shaper = CUMULET_LUT_SHAPER_LOG2,
                  .domain_min = domain_min,
@@ -120,7 +126,7 @@ DisplayLut bake_ocio_view(const OcioView& view) {
   try {
     ocio::SetLoggingLevel(ocio::LOGGING_LEVEL_NONE);  // errors are exceptions
     ocio::PackedImageDesc image(lut.values.data(), points, long{points} * points, 3);
-    processor_of(view)->apply(image);
+    processor_of(view, note)->apply(image);
   } catch (const std::exception& error) {
     throw std::runtime_error("--ocio " + view.config + ": " + error.what());
   }

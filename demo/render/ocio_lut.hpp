@@ -17,7 +17,8 @@ struct OcioView {
 };
 
 /// Bakes the view. Radiance enters as the given color space. Without one the function takes a space with a usual name
-/// of linear Rec. 709, else the role aces_interchange. Throws std::runtime_error, one line that names the flag.
-[[nodiscard]] DisplayLut bake_ocio_view(const OcioView& view);
+/// of linear Rec. 709, else the role aces_interchange, else a space with the name "linear". note: receives a line about
+/// that choice, or nothing if the space was given. Throws std::runtime_error, one line that names the flag.
+[[nodiscard]] DisplayLut bake_ocio_view(const OcioView& view, std::string* note = nullptr);
 
 }  // namespace cumulet::demo

@@ -340,7 +340,8 @@ FileKind kind_of(const std::string& path) {
   if (head.find("\"cumulet_scene\"") != std::string::npos) return FileKind::scene;
   if (head.find("\"asset\"") != std::string::npos) return FileKind::surfaces;
   throw UsageError(in_quotes(path) +
-                   " is not a volume (.vdb, .nvdb, .nrrd, .raw, .tif), glTF file (.gltf, .glb) or scene (.json)");
+                   " is not a volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), glTF file (.gltf, .glb) or scene "
+                   "(.json)");
 }
 
 /// Adds the files without a flag: at most one of each kind. The scene is loaded first.
@@ -661,8 +662,8 @@ void add_ocio_options(CLI::App& app, const char* group, OcioView& view) {
            "Display of --ocio (default: that of the configuration)");
   add_text(app, group, "--ocio-view", "NAME", view.view, "View of --ocio (default: that of the display)");
   add_text(app, group, "--ocio-input", "NAME", view.input,
-           "Color space of --ocio that is linear Rec. 709 (default: found by its name, else by the role "
-           "aces_interchange)");
+           "Color space of --ocio that is linear Rec. 709 (default: found by its name or by the role "
+           "aces_interchange, and printed)");
 }
 
 void check_ocio_options(const OcioView& view) {

@@ -1,6 +1,7 @@
 #include "settled.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <file.hpp>
 #include <filesystem>
@@ -20,16 +21,38 @@ std::string head(const SceneOptions& given) {
          std::to_string(given.height) + '\n';
 }
 
+/// Returns the name without folders, also of a folder with a slash at its end.
+std::string name_of(const std::filesystem::path& path) {
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
+bool is_slice(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending == ".tif" || ending == ".tiff";
+}
+
 }  // namespace
 
 std::string volume_state(const std::string& volume) {
+  namespace fs = std::filesystem;
   std::error_code none;
-  const std::uintmax_t size = std::filesystem::file_size(volume, none);
-  const auto changed = std::filesystem::last_write_time(volume, none).time_since_epoch();
+  std::uintmax_t size = fs::file_size(volume, none);
+  auto changed = fs::last_write_time(volume, none).time_since_epoch();
+  if (fs::is_directory(volume, none)) {
+    // The folder's own time also changes with other files in it.
+    size = 0;
+    changed = {};
+    for (fs::directory_iterator entry(volume, none), end; entry != end; entry.increment(none)) {
+      if (!is_slice(entry->path())) continue;
+      const auto slice_changed = entry->last_write_time(none).time_since_epoch();
+      changed = size == 0 ? slice_changed : std::max(changed, slice_changed);
+      size += entry->file_size(none);
+    }
+  }
   // Whole seconds: some file systems have no finer resolution, and nodes may mount one file system differently.
   return std::to_string(size) + ' ' +
-         std::to_string(std::chrono::duration_cast<std::chrono::seconds>(changed).count()) + ' ' +
-         std::filesystem::path(volume).filename().string();
+         std::to_string(std::chrono::duration_cast<std::chrono::seconds>(changed).count()) + ' ' + name_of(volume);
 }
 
 bool read_settled(const std::string& file, SceneOptions& scene, std::span<const std::string> volumes) {
@@ -43,7 +66,7 @@ bool read_settled(const std::string& file, SceneOptions& scene, std::span<const 
   if (state.size() == rest.size()) return false;
   const bool same = std::ranges::any_of(volumes, [&](const std::string& volume) {
     // The name is compared first, so that other files are not accessed.
-    return state.ends_with(' ' + std::filesystem::path(volume).filename().string()) && volume_state(volume) == state;
+    return state.ends_with(' ' + name_of(volume)) && volume_state(volume) == state;
   });
   if (!same) return false;
   std::optional<SceneOptions> found;

@@ -11,7 +11,7 @@ namespace cumulet::demo {
 /// (density scale and medium, ground, camera). Later runs need not read that volume.
 
 /// Returns a line that identifies the state of a file: size in bytes, modification time in seconds, and name without
-/// folders.
+/// folders. For a folder of slices: the sum of their sizes, and the latest time.
 [[nodiscard]] std::string volume_state(const std::string& volume);
 
 /// Reads the settings from the file into the scene. Returns false and leaves the scene unchanged if the file is missing

@@ -6,7 +6,7 @@
 
 namespace cumulet::demo {
 
-DisplayLut bake_ocio_view(const OcioView& view) {
+DisplayLut bake_ocio_view(const OcioView& view, std::string* /*note*/) {
   throw std::runtime_error("--ocio " + view.config + ": this program was built without OpenColorIO (CUMULET_OCIO)");
 }
 

@@ -9,8 +9,8 @@ from conan.tools.files import copy
 
 required_conan_version = ">=2.0"
 TREE = Path(__file__).resolve().parents[2]
-SOURCES = ("CMakeLists.txt", "LICENSE", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "cmake/*", "docs/*", "glsl/*",
-           "src/*", "third_party_notes/*")
+SOURCES = ("CMakeLists.txt", "LICENSE", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "cmake/*", "demo/embed/*",
+           "docs/*", "glsl/*", "src/*", "third_party_notes/*")
 
 # Packages by the CMake option that needs them; None: always.
 REQUIREMENTS = {

@@ -130,8 +130,8 @@ std::unique_ptr<Reader> detail::open(std::unique_ptr<ByteSource> content, Progre
   if (head == std::string_view("\0\0\0\0VDB ", 8)) {
     fail("is an OpenVDB file in big-endian byte order, which is not supported");
   }
-  if (got < magic.size()) fail("is too short to be a VDB, NanoVDB or NRRD file");
-  fail("is not a VDB, NanoVDB or NRRD file");
+  if (got < magic.size()) fail("is too short to be a VDB, NanoVDB, NRRD, VTK or TIFF file");
+  fail("is not a VDB, NanoVDB, NRRD, VTK or TIFF file");
 }
 
 }  // namespace cumulet::volume

@@ -21,7 +21,7 @@ namespace {
 
 constexpr const char* too_short = "the file is truncated or damaged: its slices have more values than bytes";
 
-/// What libtiff reads from, and the first error.
+/// Source of libtiff's reads, and the first error.
 struct Stream {
   ByteSource& content;
   std::uint64_t position = 0;
@@ -351,12 +351,63 @@ class PageSlices final : public Slices {
   std::unique_ptr<TiffFile> file_;
 };
 
+/// Returns the value of KEY=VALUE on a line of ImageJ's description.
+std::string line_value_of(const std::string& text, const std::string& key) {
+  const std::string begin = '\n' + key + '=';
+  const std::size_t found = text.find(begin);
+  if (found == std::string::npos) return {};
+  const std::size_t from = found + begin.size();
+  return text.substr(from, std::min(text.find('\n', from), text.size()) - from);
+}
+
+/// Returns the value of an XML attribute in OME's description.
+std::string attribute_of(const std::string& text, const std::string& key) {
+  constexpr std::string_view spaces = " \t\r\n";
+  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+    if (at == 0 || spaces.find(text[at - 1]) == std::string_view::npos) continue;
+    const std::size_t equals = text.find_first_not_of(spaces, at + key.size());
+    if (equals == std::string::npos || text[equals] != '=') continue;
+    const std::size_t quote = text.find_first_not_of(spaces, equals + 1);
+    if (quote == std::string::npos || (text[quote] != '"' && text[quote] != '\'')) continue;
+    return text.substr(quote + 1, std::min(text.find(text[quote], quote + 1), text.size()) - quote - 1);
+  }
+  return {};
+}
+
+bool is_ome(const std::string& text) { return text.find("<OME") != std::string::npos; }
+bool is_image_j(const std::string& text) { return text.starts_with("ImageJ="); }
+
+double number_of(const std::string& text) {
+  double number = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc{} && std::isfinite(number) ? number : 0.0;
+}
+
+/// Refuses files whose pages are several channels or time points.
+void require_one_volume(const std::string& text) {
+  const bool ome = is_ome(text);
+  if (!ome && !is_image_j(text)) return;
+  const std::string channels = ome ? attribute_of(text, "SizeC") : line_value_of(text, "channels");
+  const std::string times = ome ? attribute_of(text, "SizeT") : line_value_of(text, "frames");
+  if (number_of(channels) > 1.0) fail("has " + one_line(channels, 20) + " channels; one is read");
+  if (number_of(times) > 1.0) fail("has " + one_line(times, 20) + " time points; one is read");
+}
+
+/// Refuses files whose description gives several slices, but another number than there are pages.
+void require_all_slices(const std::string& slices, std::size_t pages) {
+  const double given = number_of(slices);
+  if (given > 1.0 && given != static_cast<double>(pages))
+    fail("has " + std::to_string(pages) + (pages == 1 ? " page" : " pages") + ", and its description gives " +
+         one_line(slices, 20) + " slices");
+}
+
 /// Opens a file that is one slice.
 std::unique_ptr<TiffFile> open_slice(const std::filesystem::path& file, Progress* progress) {
   try {
     auto opened = std::make_unique<TiffFile>(open_file(file), progress);
     if (opened->pages().size() > 1)
       fail("has " + std::to_string(opened->pages().size()) + " pages; in a folder, each file is one slice");
+    require_one_volume(opened->description().text);
     return opened;
   } catch (const Error&) {
     throw;  // canceled
@@ -382,19 +433,37 @@ class FileSlices final : public Slices {
   Page format_;
 };
 
-/// Returns the value of KEY=VALUE on a line of ImageJ's description, or of KEY="VALUE" in OME's.
-std::string value_of(const std::string& text, const std::string& key, bool quoted) {
-  const std::string begin = (quoted ? ' ' : '\n') + key + (quoted ? "=\"" : "=");
-  const std::size_t found = text.find(begin);
-  if (found == std::string::npos) return {};
-  const std::size_t from = found + begin.size();
-  return text.substr(from, std::min(text.find(quoted ? '"' : '\n', from), text.size()) - from);
+/// Returns the meters of a unit as OME writes it; 0: unknown.
+double meters_of(const std::string& unit) {
+  struct Unit {
+    std::string_view name;
+    double meters;
+  };
+  // The micro sign, the Greek letter, and the sign as a character reference.
+  constexpr std::array units = {
+      Unit{"nm", 1e-9}, Unit{"\xC2\xB5m", 1e-6},  Unit{"\xCE\xBCm", 1e-6}, Unit{"&#181;m", 1e-6}, Unit{"&#xB5;m", 1e-6},
+      Unit{"um", 1e-6}, Unit{"micrometer", 1e-6}, Unit{"mm", 1e-3},        Unit{"cm", 1e-2},      Unit{"m", 1.0}};
+  const auto* const found = std::ranges::find(units, std::string_view(unit), &Unit::name);
+  return found == units.end() ? 0.0 : found->meters;
 }
 
-double number_of(const std::string& text) {
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc{} && std::isfinite(number) ? number : 0.0;
+/// Returns the unit of an axis of OME's description, or else OME's default.
+std::string unit_of(const std::string& text, char axis) {
+  const std::string unit = attribute_of(text, std::string("PhysicalSize") + axis + "Unit");
+  return unit.empty() ? "micrometer" : unit;
+}
+
+/// Returns the distance between voxels along an axis of OME's description, in the unit of X; 0: not given.
+double physical_size_of(const std::string& text, char axis) {
+  const double size = number_of(attribute_of(text, std::string("PhysicalSize") + axis));
+  const std::string unit = unit_of(text, axis);
+  const std::string unit_of_x = unit_of(text, 'X');
+  if (!(size > 0.0) || unit == unit_of_x) return size;
+  const double ratio = meters_of(unit) / meters_of(unit_of_x);
+  if (!(ratio > 0.0) || !std::isfinite(size * ratio))
+    fail("has voxel sizes in " + one_line(unit_of_x, 20) + " and " + one_line(unit, 20) +
+         "; units that differ are converted if they are nm, \xC2\xB5m, mm, cm or m");
+  return size * ratio;
 }
 
 /// Distance between voxels, in the unit of the file, and a line about its origin.
@@ -404,44 +473,30 @@ struct VoxelSize {
 };
 
 VoxelSize voxel_size_of(const Description& from) {
-  const bool ome = from.text.find("<OME") != std::string::npos;
-  const bool image_j = from.text.starts_with("ImageJ=");
   VoxelSize voxel;
   std::string unit = from.unit == RESUNIT_CENTIMETER ? "centimeter" : from.unit == RESUNIT_INCH ? "inch" : "no unit";
   double depth = 0.0;
-  if (ome) {
-    const glm::dvec2 physical(number_of(value_of(from.text, "PhysicalSizeX", true)),
-                              number_of(value_of(from.text, "PhysicalSizeY", true)));
-    depth = number_of(value_of(from.text, "PhysicalSizeZ", true));
+  if (is_ome(from.text)) {
+    const glm::dvec2 physical(physical_size_of(from.text, 'X'), physical_size_of(from.text, 'Y'));
     if (physical.x > 0.0 && physical.y > 0.0) {
-      unit = value_of(from.text, "PhysicalSizeXUnit", true);
+      depth = physical_size_of(from.text, 'Z');
       voxel.size = glm::dvec3(physical, 0.0);
-      voxel.source = "PhysicalSize of OME, " + (unit.empty() ? "micrometer" : unit);
+      voxel.source = "PhysicalSize of OME, " + unit_of(from.text, 'X');
     }
   }
   if (voxel.source.empty()) {
     if (!(from.pixels_per_unit.x > 0.0 && from.pixels_per_unit.y > 0.0)) return {};
     if (!std::isfinite(from.pixels_per_unit.x) || !std::isfinite(from.pixels_per_unit.y)) return {};
     voxel.size = glm::dvec3(1.0 / from.pixels_per_unit, 0.0);
-    if (image_j) {
-      depth = std::abs(number_of(value_of(from.text, "spacing", false)));
-      if (const std::string given = value_of(from.text, "unit", false); !given.empty()) unit = given;
+    if (is_image_j(from.text)) {
+      depth = std::abs(number_of(line_value_of(from.text, "spacing")));
+      if (const std::string given = line_value_of(from.text, "unit"); !given.empty()) unit = given;
     }
     voxel.source = "resolution tags, " + unit;
   }
   voxel.size.z = depth > 0.0 ? depth : voxel.size.x;
   if (!(depth > 0.0)) voxel.source += "; the distance of slices is not given, and is that of columns";
   return voxel;
-}
-
-/// Refuses files whose pages are several channels or moments.
-void require_one_volume(const std::string& text) {
-  const bool ome = text.find("<OME") != std::string::npos;
-  if (!ome && !text.starts_with("ImageJ=")) return;
-  const std::string channels = value_of(text, ome ? "SizeC" : "channels", ome);
-  const std::string moments = value_of(text, ome ? "SizeT" : "frames", ome);
-  if (number_of(channels) > 1.0) fail("has " + one_line(channels, 20) + " channels; one is read");
-  if (number_of(moments) > 1.0) fail("has " + one_line(moments, 20) + " moments; one is read");
 }
 
 std::unique_ptr<Reader> reader_of(ArrayField field, const Page& format, std::size_t slices,
@@ -472,11 +527,10 @@ std::unique_ptr<Reader> open_tiff(std::unique_ptr<ByteSource> content, Progress*
   const Description description = file->description();
   require_one_volume(description.text);
   // ImageJ writes stacks above 4 GB as one page, which the other slices follow.
-  const double images =
-      description.text.starts_with("ImageJ=") ? number_of(value_of(description.text, "images", false)) : 0.0;
+  const std::string given_images = is_image_j(description.text) ? line_value_of(description.text, "images") : "";
+  const double images = number_of(given_images);
   if (file->pages().size() == 1 && images > 1.0 && images <= 1e9) {
-    if (!format.is_plain)
-      fail("has one page of " + value_of(description.text, "images", false) + ", and it is compressed");
+    if (!format.is_plain) fail("has one page of " + one_line(given_images, 20) + ", and it is compressed");
     ArrayField field;
     field.first_byte = format.first_byte;
     field.big_endian = file->is_big_endian();
@@ -484,6 +538,7 @@ std::unique_ptr<Reader> open_tiff(std::unique_ptr<ByteSource> content, Progress*
                      std::move(*file).release(), progress);
   }
   const std::size_t slices = file->pages().size();
+  require_all_slices(is_ome(description.text) ? attribute_of(description.text, "SizeZ") : given_images, slices);
   return reader_of(decoded_field(), format, slices, description, std::make_unique<PageSlices>(std::move(file)),
                    progress);
 }

@@ -295,6 +295,13 @@ TEST(Preferences, RoundTripAndTolerateDamage) {
   preferences.remember("/a/../b/15.vdb");
   preferences.remember("/a/15.vdb");
   EXPECT_EQ(preferences.recent.size(), 10u);
+  Preferences folders;
+  folders.remember("/a/slices/");
+  folders.remember("/a/slices");
+  EXPECT_EQ(folders.recent, std::vector<std::string>{"/a/slices"});
+  EXPECT_EQ(folders.folder, "/a");
+  folders.forget("/a/slices/");
+  EXPECT_TRUE(folders.recent.empty());
   EXPECT_EQ(preferences.recent[0], "/a/15.vdb");
   EXPECT_EQ(preferences.recent[1], "/b/15.vdb");
   EXPECT_EQ(std::set<std::string>(preferences.recent.begin(), preferences.recent.end()).size(), 10u);

@@ -4,6 +4,7 @@ features and options are those of the project. Both name every package that CMak
 Usage: manifests_test.py SOURCE_DIR"""
 
 import ast
+import fnmatch
 import json
 import re
 import sys
@@ -81,6 +82,21 @@ def check_vcpkg(source, project, wanted):
         expect(f"{feature} CUMULET_{feature.upper()}" in port, f"portfile.cmake ignores the feature {feature}")
 
 
+def installed_paths(source):
+    """Returns the files and folders of the tree that every build installs: those of commands outside conditions."""
+    text = re.sub(r"#.*", "", (source / "cmake/Packaging.cmake").read_text())
+    paths = []
+    for command in re.findall(r"^install\(([^)]*)\)", text, re.MULTILINE):
+        if "OPTIONAL" not in command.split():
+            paths += re.findall(r"\$\{PROJECT_SOURCE_DIR\}/([\w./-]+)", command)
+    return paths
+
+
+def is_exported(path, globs):
+    """Conan's patterns are those of fnmatch: * matches slashes, too."""
+    return any(fnmatch.fnmatch(name, glob) for glob in globs for name in (path, path.rstrip("/") + "/x"))
+
+
 def check_conan(source, project, wanted):
     text = (source / "packaging/conan/conanfile.py").read_text()
     tree = ast.parse(text)
@@ -107,6 +123,10 @@ def check_conan(source, project, wanted):
         expect(names[1] in named, f"conanfile.py does not name {names[1]}")
     for glob in values["SOURCES"]:
         expect(any(source.glob(glob)), f"conanfile.py: {glob} matches no file")
+    installed = installed_paths(source)
+    expect("demo/embed/" in installed, f"Packaging.cmake installs {installed}, without the example hosts")
+    for path in installed:
+        expect(is_exported(path, values["SOURCES"]), f"conanfile.py does not export {path}, which is installed")
     for option in re.findall(r'variables\["(CUMULET_\w+)"\]', text):
         expect(option in project["options"], f"conanfile.py: there is no option {option}")
 

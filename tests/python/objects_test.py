@@ -98,9 +98,10 @@ class Arrays(unittest.TestCase):
                     cumulet.Environment.from_stream(io.BytesIO(content), "pak:sky")):
             info = sky.get_info()
             self.assertEqual((info.name, info.width, info.height), ("pak:sky", 2, 1))
+        no_volume = "pak:cloud: is not a VDB, NanoVDB, NRRD, VTK or TIFF file"
         for line, function, *arguments in (
-                ("pak:cloud: is not a VDB, NanoVDB or NRRD file", cumulet.Volume.from_bytes, content, "pak:cloud"),
-                ("pak:cloud: is not a VDB, NanoVDB or NRRD file", cumulet.Volume.from_stream, io.BytesIO(content), "pak:cloud"),
+                (no_volume, cumulet.Volume.from_bytes, content, "pak:cloud"),
+                (no_volume, cumulet.Volume.from_stream, io.BytesIO(content), "pak:cloud"),
                 ("stream: is empty", cumulet.Volume.from_stream, io.BytesIO()),
                 ("memory: truncated Radiance file", cumulet.Environment.from_bytes, header[:20])):
             self.assertEqual(self.line_of(cumulet.Error, function, *arguments), line)

@@ -146,8 +146,8 @@ TEST_F(HostVolume, BadContentIsOneLineWithTheHostsName) {
     EXPECT_EQ(answer.line, line);
   };
   expect(from_memory("", &desc), "pak:cloud: is empty");
-  expect(from_memory("#?RADIANCE\n", &desc), "pak:cloud: is not a VDB, NanoVDB or NRRD file");
-  expect(from_memory("abc"), "memory: is too short to be a VDB, NanoVDB or NRRD file");
+  expect(from_memory("#?RADIANCE\n", &desc), "pak:cloud: is not a VDB, NanoVDB, NRRD, VTK or TIFF file");
+  expect(from_memory("abc"), "memory: is too short to be a VDB, NanoVDB, NRRD, VTK or TIFF file");
   const Answer cut = from_memory(content.substr(0, content.size() / 2), &desc);
   EXPECT_EQ(cut.status, CUMULET_ERROR_FILE);
   EXPECT_EQ(cut.line.rfind("pak:cloud: ", 0), 0U) << cut.line;

@@ -122,6 +122,17 @@ TEST_F(OcioLut, RadianceIsLinearRec709) {
   const std::string by_role = write(config_text("working", aces_to_rec709, role));
   EXPECT_LT(greatest_error(bake_ocio_view({.config = by_role}), plain), 0.5);
   EXPECT_GT(greatest_error(bake_ocio_view({.config = by_role, .input = "reference"}), plain), 20.0);
+  // "linear" may have other primaries than Rec. 709: the role is used before it.
+  std::string note;
+  const std::string role_and_linear = write(config_text("linear", nothing, role));
+  EXPECT_GT(greatest_error(bake_ocio_view({.config = role_and_linear}, &note), plain), 20.0);
+  EXPECT_EQ(note, "--ocio " + role_and_linear + ": radiance enters by the color space 'aces_interchange'");
+  const std::string linear = write(config_text("linear", aces_to_rec709));
+  EXPECT_LT(greatest_error(bake_ocio_view({.config = linear}, &note), plain), 0.5);
+  EXPECT_EQ(note, "--ocio " + linear + ": radiance enters by the color space 'linear'");
+  note.clear();
+  static_cast<void>(bake_ocio_view({.config = linear, .input = "linear"}, &note));
+  EXPECT_EQ(note, "");
   const std::string unknown = write(config_text("working", aces_to_rec709));
   EXPECT_LT(greatest_error(bake_ocio_view({.config = unknown, .input = "working"}), plain), 0.5);
   EXPECT_EQ(refusal({.config = unknown}),

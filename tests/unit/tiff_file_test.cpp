@@ -228,6 +228,47 @@ TEST_F(TiffStack, VoxelSizeIsThatOfTheFile) {
   EXPECT_EQ(metadata_of(path("a.tif")), "PhysicalSize of OME, micrometer");
 }
 
+TEST_F(TiffStack, EachAxisOfOmeHasItsUnit) {
+  const auto described = [](const std::string& attributes) {
+    return Format{.more = [text = "<OME><Pixels" + attributes + "/></OME>"](TIFF* tiff, int /*page*/) {
+      TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, text.c_str());
+    }};
+  };
+  const auto expect_size = [](const ScalarVolume& got, const glm::dvec3& wanted) {
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(got.index_to_world[axis][axis], wanted[axis], 1e-7 * wanted[axis]);
+  };
+  const std::string x = " PhysicalSizeX='250'\n\tPhysicalSizeXUnit = 'nm'";
+  const std::string y = "\r\nPhysicalSizeY=\"0.5\"";  // the default: micrometers
+  expect_size(read_written<std::uint8_t>(described(
+                  x + y + " PhysicalSizeYUnit=\"\xC2\xB5m\" PhysicalSizeZ=\"0.002\" PhysicalSizeZUnit=\"mm\"")),
+              {250, 500, 2000});
+  EXPECT_EQ(metadata_of(path("a.tif")), "PhysicalSize of OME, nm");
+  expect_size(read_written<std::uint8_t>(described(x + y + " PhysicalSizeZ=\"1\" PhysicalSizeZUnit=\"&#181;m\"")),
+              {250, 500, 1000});
+  // A unit that is not converted is kept if it is that of all axes.
+  expect_size(read_written<std::uint8_t>(
+                  described(" PhysicalSizeX=\"2\" PhysicalSizeXUnit=\"pixel\" PhysicalSizeY=\"3\" "
+                            "PhysicalSizeYUnit=\"pixel\" PhysicalSizeZ=\"4\" PhysicalSizeZUnit=\"pixel\"")),
+              {2, 3, 4});
+  EXPECT_EQ(refusal(described(x + y + " PhysicalSizeZ=\"4\" PhysicalSizeZUnit=\"pixel\"")),
+            "has voxel sizes in nm and pixel; units that differ are converted if they are nm, \xC2\xB5m, mm, cm or m");
+}
+
+TEST_F(TiffStack, PagesAreAllSlicesOfTheDescription) {
+  const auto described = [](const char* text, int pages) {
+    return Format{.size = {5, 4, pages},
+                  .more = [text](TIFF* tiff, int /*page*/) { TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, text); }};
+  };
+  constexpr const char* ome = "<OME><Pixels\nSizeC='1' SizeZ='3'/></OME>";
+  constexpr const char* image_j = "ImageJ=1.53t\nimages=3\nslices=3\n";
+  expect_values(read_written<std::uint8_t>(described(ome, 3)));
+  expect_values(read_written<std::uint8_t>(described(image_j, 3)));
+  EXPECT_EQ(refusal(described(ome, 1)), "has 1 page, and its description gives 3 slices");
+  EXPECT_EQ(refusal(described(ome, 2)), "has 2 pages, and its description gives 3 slices");
+  EXPECT_EQ(refusal(described(image_j, 2)), "has 2 pages, and its description gives 3 slices");
+  EXPECT_EQ(refusal(described("<OME><Pixels\nSizeT='3'/></OME>", 3)), "has 3 time points; one is read");
+}
+
 TEST_F(TiffStack, SmallerCopiesAreNoSlices) {
   const auto copy = [](TIFF* tiff, int page) {
     if (page == 1) TIFFSetField(tiff, TIFFTAG_SUBFILETYPE, FILETYPE_REDUCEDIMAGE);
@@ -297,6 +338,11 @@ TEST_F(TiffStack, FilesOfAFolderAreSlices) {
             "slice11.tif has 5 x 3 pixels of uint16, and slice8.tif has 5 x 4 pixels of uint16");
   write_tiff<std::uint8_t>(path("slices/slice11.tif"), {});
   EXPECT_EQ(refusal_of(path("slices")), "slice11.tif: has 3 pages; in a folder, each file is one slice");
+  const auto channels = [](TIFF* tiff, int /*page*/) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "<OME><Pixels SizeC=\"2\" SizeT=\"1\"/></OME>");
+  };
+  write_tiff<std::uint16_t>(path("slices/slice11.tif"), {.bits = 16, .size = {5, 4, 1}, .more = channels});
+  EXPECT_EQ(refusal_of(path("slices")), "slice11.tif: has 2 channels; one is read");
   write("slices/slice11.tif", "no TIFF");
   EXPECT_EQ(refusal_of(path("slices")).rfind("slice11.tif: ", 0), 0U) << refusal_of(path("slices"));
 }
@@ -325,7 +371,7 @@ TEST_F(TiffStack, OtherImagesAreOneLine) {
             "has float values of 64 bits; integers of 8 and 16 bits and floats of 32 bits are read");
   EXPECT_EQ(refusal({.compression = COMPRESSION_ZSTD}), "is compressed by ZSTD; LZW, deflate and PackBits are read");
   EXPECT_EQ(refusal(described("ImageJ=1.53t\nimages=3\nchannels=3\n")), "has 3 channels; one is read");
-  EXPECT_EQ(refusal(described("<OME><Pixels SizeC=\"1\" SizeT=\"3\"/></OME>")), "has 3 moments; one is read");
+  EXPECT_EQ(refusal(described("<OME><Pixels SizeC=\"1\" SizeT=\"3\"/></OME>")), "has 3 time points; one is read");
   EXPECT_EQ(refusal({.rows_per_strip = 2,
                      .size = {5, 2, 3},
                      .more =

@@ -3,10 +3,10 @@
 #include <QOpenGLContext>
 #include <QOpenGLFramebufferObject>
 #include <QOpenGLFunctions>
+#include <QQuickOpenGLUtils>
 #include <QQuickWindow>
 #include <algorithm>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -18,7 +18,10 @@ SharedViewer::SharedViewer() {
                                                   emit warned(QString::fromUtf8(text.data(), qsizetype(text.size())));
                                               },
                                           .update = [this] { emit changed(); }});
-  if (!created) throw std::runtime_error(created.error().message.c_str());
+  if (!created) {
+    failure = created.error().message.c_str();
+    return;
+  }
   viewer = std::move(created).value();
   static_cast<void>(viewer.set_sun_sky({.sun_azimuth_degrees = 60.0F,
                                         .sun_elevation_degrees = 40.0F,
@@ -32,7 +35,9 @@ class ViewRenderer final : public QQuickFramebufferObject::Renderer {
   explicit ViewRenderer(std::shared_ptr<SharedViewer> shared) : shared_(std::move(shared)) {}
   ViewRenderer(const ViewRenderer&) = delete;
   ViewRenderer& operator=(const ViewRenderer&) = delete;
-  ~ViewRenderer() override { static_cast<void>(shared_->viewer.detach()); }
+  ~ViewRenderer() override {
+    if (attached_) static_cast<void>(shared_->viewer.detach());
+  }
 
   QOpenGLFramebufferObject* createFramebufferObject(const QSize& size) override {
     return new QOpenGLFramebufferObject(size);  // Qt Quick owns it
@@ -46,10 +51,20 @@ class ViewRenderer final : public QQuickFramebufferObject::Renderer {
     next_ = item->settings_;
   }
 
+  /// Qt Quick leaves its own state before this call, and expects the default state after it.
   void render() override {
+    QQuickOpenGLUtils::resetOpenGLState();
+    draw();
+    QQuickOpenGLUtils::resetOpenGLState();
+  }
+
+ private:
+  void draw() {
+    framebufferObject()->bind();
     QOpenGLFunctions* gl = QOpenGLContext::currentContext()->functions();
     gl->glClearColor(0.12F, 0.12F, 0.13F, 1.0F);
     gl->glClear(GL_COLOR_BUFFER_BIT);  // Cumulet draws nothing before the first image
+    if (!shared_->failure.isEmpty()) return input_.clear();
     if (!attached_) {
       QOpenGLContext* context = QOpenGLContext::currentContext();
       attached_ = ok(shared_->viewer.attach([context](const char* name) { return context->getProcAddress(name); }));
@@ -76,7 +91,6 @@ class ViewRenderer final : public QQuickFramebufferObject::Renderer {
     if (frame->has(cumulet::RenderFlags::incomplete)) update();
   }
 
- private:
   template <class T>
   bool ok(const cumulet::Result<T>& result) {
     if (!result) report(result.error().message.c_str());
@@ -93,7 +107,10 @@ class ViewRenderer final : public QQuickFramebufferObject::Renderer {
       ok(viewer.set_display({.exposure_stops = static_cast<float>(next_.exposure)}));
     if (shared_->loaded != next_.source) {
       shared_->loaded = next_.source;
-      ok(viewer.load_volume(next_.source.toLocalFile().toStdString()));
+      if (next_.source.isEmpty())
+        ok(viewer.set_volume(cumulet::Volume()));
+      else
+        ok(viewer.load_volume(next_.source.toLocalFile().toStdString()));
     }
     set_ = next_;
   }
@@ -116,6 +133,10 @@ CumuletView::CumuletView(QQuickItem* parent)
   connect(shared_.get(), &SharedViewer::changed, this, &QQuickItem::update);
   connect(shared_.get(), &SharedViewer::drawn, this, &CumuletView::take_frame);
   connect(shared_.get(), &SharedViewer::warned, this, &CumuletView::problem);
+  // QML connects its handlers after this constructor.
+  if (!shared_->failure.isEmpty())
+    QMetaObject::invokeMethod(
+        this, [this] { emit problem(shared_->failure); }, Qt::QueuedConnection);
 }
 
 QQuickFramebufferObject::Renderer* CumuletView::createRenderer() const { return new ViewRenderer(shared_); }
@@ -164,6 +185,7 @@ cumulet::Event CumuletView::at(cumulet::EventType type, QPointF position, Qt::Ke
 }
 
 void CumuletView::pointer(cumulet::EventType type, QMouseEvent& event) {
+  held_ = event.buttons() & (Qt::LeftButton | Qt::MiddleButton | Qt::RightButton);
   cumulet::Event input = at(type, event.position(), event.modifiers());
   if (type != cumulet::EventType::pointer_move) {
     if (event.button() != Qt::LeftButton && event.button() != Qt::MiddleButton && event.button() != Qt::RightButton)
@@ -182,7 +204,11 @@ void CumuletView::mousePressEvent(QMouseEvent* event) {
 }
 void CumuletView::mouseReleaseEvent(QMouseEvent* event) { pointer(cumulet::EventType::button_up, *event); }
 void CumuletView::mouseMoveEvent(QMouseEvent* event) { pointer(cumulet::EventType::pointer_move, *event); }
-void CumuletView::mouseUngrabEvent() { keep({.type = cumulet::EventType::focus_lost}); }
+
+/// Qt calls this after each release, too. Only buttons that are still down get no release of their own.
+void CumuletView::mouseUngrabEvent() {
+  if (std::exchange(held_, Qt::NoButton) != Qt::NoButton) keep({.type = cumulet::EventType::focus_lost});
+}
 
 void CumuletView::wheelEvent(QWheelEvent* event) {
   cumulet::Event input = at(cumulet::EventType::wheel, event->position(), event->modifiers());

@@ -18,7 +18,8 @@ class SharedViewer final : public QObject {
   SharedViewer();
 
   cumulet::Viewer viewer;
-  QUrl loaded;  // of the thread that renders
+  QString failure;  // why there is no viewer; empty: there is one
+  QUrl loaded;      // of the thread that renders
 
  signals:          // from any thread
   void changed();  // there is something to draw
@@ -29,7 +30,8 @@ class SharedViewer final : public QObject {
 /// A QML item that shows one Cumulet viewer.
 ///
 /// All calls of the viewer are made by the thread that renders, which has the GL context. The item keeps input and
-/// settings until synchronize(), during which Qt blocks the item's thread.
+/// settings until synchronize(), during which Qt blocks the item's thread: the viewer then shows the same state as the
+/// other items of the frame. (Calls without GL could also be made at once.)
 class CumuletView : public QQuickFramebufferObject {
   Q_PROPERTY(QUrl source READ source WRITE set_source NOTIFY source_changed)
   Q_PROPERTY(int samples READ samples WRITE set_samples NOTIFY samples_changed)
@@ -44,7 +46,7 @@ class CumuletView : public QQuickFramebufferObject {
 
   [[nodiscard]] Renderer* createRenderer() const override;
 
-  /// The volume, as a local file.
+  /// The volume, as a local file; empty: none.
   [[nodiscard]] QUrl source() const { return settings_.source; }
   void set_source(const QUrl& source);
   /// Samples per pixel; 0: the library's default.
@@ -98,6 +100,7 @@ class CumuletView : public QQuickFramebufferObject {
   std::vector<cumulet::Event> input_;  // since the last frame
   double progress_ = 0.0;
   bool converged_ = false;
+  Qt::MouseButtons held_;  // buttons of the viewer that are down
   int frames_ = 0;
   int contexts_ = 0;
 };
