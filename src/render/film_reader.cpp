@@ -72,6 +72,7 @@ PendingRead::PendingRead(const gl::FunctionsPtr& gl, FilmValues values) : values
   gl->BindBuffer(GL_PIXEL_PACK_BUFFER, buffer_.name());
   std::size_t offset = 0;
   for (const FilmValues::Source& source : values_.sources()) {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): so GL takes offsets
     copy_source(*gl, values_, source, reinterpret_cast<void*>(offset));
     offset += aligned(values_.bytes_of(source));
   }

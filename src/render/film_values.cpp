@@ -43,7 +43,7 @@ void divide(const glm::uvec2* counts, const float* sums, std::size_t pixels, flo
 void make_means(Copies copies, std::size_t pixels, float* values) {
   divide(texels<glm::uvec2>(copies, 0), texels<float>(copies, 1), pixels, values);
   if (copies.size() < 3) return;
-  const float* background = texels<float>(copies, 2);
+  const auto* background = texels<float>(copies, 2);
   for (std::size_t i = 0; i < pixels; ++i) {
     for (std::size_t c = 0; c < 3; ++c) values[4 * i + c] += background[4 * i + c];
   }
@@ -69,10 +69,10 @@ void make_errors(Copies copies, std::size_t pixels, float* values) {
 
 // copies: transparent, opaque.
 void make_drawn(Copies copies, std::size_t pixels, float* values) {
-  const float* transparent = texels<float>(copies, 0);
+  const auto* transparent = texels<float>(copies, 0);
   if (values != transparent) std::memcpy(values, transparent, pixels * sizeof(glm::vec4));
   if (copies.size() < 2) return;
-  const float* opaque = texels<float>(copies, 1);
+  const auto* opaque = texels<float>(copies, 1);
   for (std::size_t i = 0; i < 4 * pixels; ++i) {
     if (i % 4 != 3) values[i] = opaque[i];
   }

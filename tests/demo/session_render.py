@@ -88,7 +88,8 @@ def test_render_sequence(s):
     there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
     s.play("replay", [*there, "key f12", "frames 3", *SMALL, 'click "Sequence"', "frames 2", *shot("dialog"), *enter("Picture file", "out_##.png"),
                       "key .", *there, "wait rendered", "frames 3", *shot("done"),
-                      "key f12", "frames 3", 'click "Sequence"', "frames 2", *enter("Picture file", "single.png"), "wait rendered", "frames 3",
+                      "key f12", "frames 3", *enter("Max samples", "4"), 'click "Sequence"', "frames 2",
+                      *enter("Picture file", "single.png"), "wait rendered", "frames 3",
                       *shot("still")],
            "fire_#.vdb", "--spp", "1", "--max-bounces", "2", "--shader-cache", "shaders", size=["--size", "900x600"])
     (entry,) = s.report("done")["renders"]

@@ -505,7 +505,7 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
 
 /**
  * Reads the density of a .vdb or .nvdb file, and the other fields that are found by name (docs/grids.md). All functions
- * that read volumes also read dense arrays: .nrrd, .vti, .tif, folders of .tif slices, and .raw with a JSON description.
+ * that read volumes also read dense arrays: .nrrd, .vti, .tif, folders of .tif slices, .raw with a JSON description.
  *
  * Without a name, the density is the grid called "density", or else "smoke" or "soot". A file that has none of these,
  * but a temperature or a flame, has no density: it shows only fire. In a file without any of them, the first scalar fog
