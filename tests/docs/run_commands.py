@@ -32,6 +32,16 @@ FILES = {
     "cloud.json": "sample.json",
     "build/sample": "",
 }
+# The reader's OpenColorIO configuration, with the displays and views that pages name.
+OCIO = """ocio_profile_version: 2
+roles: {default: lin_rec709}
+displays:
+  sRGB - Display:
+    - !<View> {name: ACES 1.0 - SDR Video, colorspace: lin_rec709}
+    - !<View> {name: Film, colorspace: lin_rec709}
+colorspaces:
+  - !<ColorSpace> {name: lin_rec709}
+"""
 PLACEHOLDER = re.compile(r"#+")
 PROGRAMS = ("cumulet-render", "cumulet-merge", "cumulet-farm", "cumulet-scene")
 
@@ -82,6 +92,7 @@ def prepare(scene, folder):
     folder.mkdir(parents=True)
     for name in (CLOUD, FIRE, MODEL):
         (folder / name).symlink_to(scene / name)
+    (folder / "config.ocio").write_text(OCIO)
     for name, sample in FILES.items():
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
