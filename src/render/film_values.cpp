@@ -133,10 +133,11 @@ void copy_source(const gl::Functions& gl, const FilmValues& values, const FilmVa
   const int rows = static_cast<int>(std::clamp<std::size_t>(most, 1, std::max(values.size().y, 1U)));
   for (int y = 0; y < size.y; y += rows) {
     const int height = std::min(rows, size.y - y);
-    gl.GetTextureSubImage(
-        source.texture, 0, 0, y, static_cast<GLint>(source.slice), size.x, height, 1, source.format, source.type,
-        static_cast<GLsizei>(static_cast<std::size_t>(height) * row_bytes),
-        reinterpret_cast<void*>(reinterpret_cast<std::uintptr_t>(to) + static_cast<std::size_t>(y) * row_bytes));
+    const std::uintptr_t at = reinterpret_cast<std::uintptr_t>(to) + static_cast<std::size_t>(y) * row_bytes;
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): so GL takes offsets
+    void* const first_row = reinterpret_cast<void*>(at);
+    gl.GetTextureSubImage(source.texture, 0, 0, y, static_cast<GLint>(source.slice), size.x, height, 1, source.format,
+                          source.type, static_cast<GLsizei>(static_cast<std::size_t>(height) * row_bytes), first_row);
   }
 }
 
