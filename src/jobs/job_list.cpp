@@ -47,7 +47,7 @@ bool JobList::wait(Until until) const {
   });
 }
 
-// Not the whole time at once: a player that is dropped meanwhile ends only when nobody holds it.
+// Waits in short steps: a player that is dropped meanwhile ends only when its last holder lets it go.
 bool JobList::wait_while_listed(const JobSource& player, Until until) const {
   using Clock = std::chrono::steady_clock;
   constexpr auto step = std::chrono::milliseconds(20);

@@ -67,7 +67,7 @@ Totals FilmReader::totals(const Picture& picture) const {
 PendingRead::PendingRead(const gl::FunctionsPtr& gl, FilmValues values) : values_(std::move(values)) {
   for (const FilmValues::Source& source : values_.sources()) bytes_ += aligned(values_.bytes_of(source));
   buffer_ = gl::ReadBack::unfilled(gl, bytes_, "creating the buffer to read the image back");
-  // What dispatches have written is copied.
+  // The copies contain the writes of all dispatches before.
   gl::memory_barrier(*gl, GL_TEXTURE_UPDATE_BARRIER_BIT);
   gl->BindBuffer(GL_PIXEL_PACK_BUFFER, buffer_.name());
   std::size_t offset = 0;

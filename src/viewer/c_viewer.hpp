@@ -83,7 +83,7 @@ cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
   return status;
 }
 
-/// The same for a call that needs the viewer's state lock.
+/// As above, for a call that needs the viewer's state lock.
 template <class Call>
 cumulet_status with_state(cumulet_viewer* viewer, Call&& call) noexcept {
   return guarded(viewer, [&](viewer::Viewer& v) {

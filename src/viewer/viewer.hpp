@@ -63,7 +63,7 @@ class Viewer final : private StageHost {
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
-  /// Locks what settings and input change. Calls that use the context must not be made under it, nor wait() and
+  /// Locks the state of settings and input. Calls that use the context must not be made under it, nor wait() and
   /// encode_display().
   [[nodiscard]] StateLock::Held hold_state() const { return StateLock::Held(state_); }
 

@@ -68,7 +68,7 @@ SurfacesRef make_wall(float z) {
   return make_surfaces({&mesh, 1});
 }
 
-// What rays down z see, by quadrature.
+// The features that rays down z see, by quadrature.
 class Layers {
  public:
   Layers(double scale, cumulet_interpolation interpolation) : scale_(scale), interpolation_(interpolation) {}

@@ -55,7 +55,7 @@ class CumuletView : public QQuickFramebufferObject {
   /// In stops.
   [[nodiscard]] double exposure() const { return settings_.exposure; }
   void set_exposure(double stops);
-  /// Of the image, 0 to 1.
+  /// The finished part of the image, 0 to 1.
   [[nodiscard]] double progress() const { return progress_; }
   [[nodiscard]] bool converged() const { return converged_; }
   /// Number of frames and of contexts so far.

@@ -4003,7 +4003,7 @@ CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov 
  */
 CUMULET_API cumulet_status cumulet_read_light_group(cumulet_viewer* viewer, uint32_t group, float* rgb, size_t count);
 
-/** What cumulet_begin_read copies. */
+/** The image that cumulet_begin_read copies. */
 typedef enum cumulet_read_source {
   CUMULET_READ_LINEAR = 0, /**< The values of cumulet_read_linear, 4 floats a pixel. */
   /**
@@ -4047,7 +4047,7 @@ typedef struct cumulet_read_info {
  * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
- * @param desc   What to read.
+ * @param desc   The image to read.
  * @param read   Receives the number of the read, never 0.
  * @return CUMULET_OK; CUMULET_ERROR_INVALID_ARGUMENT before the first image, with 16 reads begun, for an AOV that
  * samples do not accumulate or that was not accumulated, for a light group that was not accumulated, and for AOVs and

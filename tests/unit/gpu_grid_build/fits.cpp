@@ -164,7 +164,7 @@ TEST_P(GpuGridBuilds, ChannelsMatchTheVoxels) {
           expect_means(of, core::cm_record_v0(words), shape, emission[c].mean, color[c], anisotropy[c], velocity[c]))
           << i << ' ' << c;
     }
-    // The same emissive cells in the same order.
+    // The emissive cells are equal, and in the same order.
     const scene::EmissiveTable wanted = scene::emissive_table(expected);
     ASSERT_EQ(built.emissive.cells.size(), wanted.cells.size()) << i;
     EXPECT_NEAR(built.emissive.power, wanted.power, 1e-5 * wanted.power);
