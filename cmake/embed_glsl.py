@@ -78,7 +78,7 @@ def variants_of(name, source):
     lines = []
     for line in re.findall(r"^// variants:(.*)$", source, re.M):
         lines.append([[parse_macro(m, name) for m in part if m != "-"] for part in with_lists(line, lists)])
-    excluded = [{parse_macro(m, name)[0]: parse_macro(m, name)[1] for m in part.split()}
+    excluded = [dict(parse_macro(m, name)[:2] for m in part.split())
                 for line in re.findall(r"^// excluded:(.*)$", source, re.M) for part in line.split(" or ")]
     variants = [sum(choice, []) for choice in itertools.product(*lines)]
     for macros in excluded:
