@@ -246,7 +246,7 @@ class Viewer final : private StageHost {
  private:
   // Runs `body` in the context, after the calls of other threads that use it.
   void in_context(const std::function<void(Context&)>& body);
-  // Updates what other threads know about the context. The caller holds the state lock.
+  // Updates the copy of the context's state for other threads. The caller holds the state lock.
   void take_frames();
   // True if a worker is busy or has a result that has not been taken.
   [[nodiscard]] bool busy() const { return jobs_.busy() || stage_.volumes.frames_are_due(); }
@@ -264,7 +264,7 @@ class Viewer final : private StageHost {
   [[nodiscard]] DisplaySettings display_now() const;
   // Prepares a frame and takes its state.
   void take_state(const Frame& frame, Shot& shot, Context::UploadLimits& limits);
-  // Takes what the frame has displayed, and fills in the flags about pending work.
+  // Records the displayed frames, and fills in the flags about pending work.
   void finish_frame(Context& g, FrameResult& result);
   // Updates the upload progress for status() and stats().
   void follow_upload(const Context& g);

@@ -258,7 +258,7 @@ TEST_F(SettingsThreads, CallsOfOtherThreadsEndWhileAFrameRuns) {
   ASSERT_EQ(cumulet_render(v, &frame, nullptr), CUMULET_OK);
   ASSERT_TRUE(ended);
   EXPECT_GT(updates_, updates);  // there is something to render
-  // That frame shows the state that it found, and later ones the new one.
+  // The running frame shows the state that it found, and later frames show the new one.
   EXPECT_EQ(target_.pixels(), before);
   const Picture after = picture_of(v);
   EXPECT_NE(after, before);
