@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -13,7 +14,7 @@ namespace cumulet::test {
 /// The text of glsl/NAME with its includes expanded, for shaders that tests write around it.
 inline std::string glsl_file(const std::string& name) {
   constexpr std::string_view include = "#include \"";
-  std::ifstream in(std::string(CUMULET_GLSL_DIR) + "/" + name);
+  std::ifstream in(std::filesystem::path(CUMULET_GLSL_DIR) / name);
   std::string text;
   for (std::string line; std::getline(in, line);) {
     text += line.starts_with(include) ? glsl_file(line.substr(include.size(), line.rfind('"') - include.size())) : line;
