@@ -1,4 +1,4 @@
-"""Resolve #include "x.glsl" in glsl/, and write one C++ file that holds all shaders, and a header that names the macros
+"""Resolve #include "folder/x.glsl" (relative to glsl/) in the shaders of glsl/, and write one C++ file that holds all shaders, and a header that names the macros
 of their variants.
 
 A shader that is compiled with macros lists them in comments; gl::Programs builds only these variants:
@@ -27,24 +27,25 @@ INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 MACRO = re.compile(r"(CM_[A-Z_]+)=(?:(\d+)\.\.(\d+)|(\w+(?:,\w+)*))")
 
 
-def flatten(path, seen):
+def flatten(root, path, seen):
     lines = []
     for line in path.read_text().splitlines():
         match = INCLUDE.match(line)
         if not match:
             lines.append(line)
             continue
-        included = path.parent / match.group(1)
+        included = root / match.group(1)
         if included not in seen:
             seen.add(included)
-            lines += flatten(included, seen)
+            lines += flatten(root, included, seen)
     return lines
 
 
 def shaders_of(folder):
     """Yields the path and the whole source of each shader."""
-    for path in sorted(p for p in folder.iterdir() if p.suffix in (".comp", ".vert", ".frag")):
-        yield path, "\n".join(flatten(path, set())) + "\n"
+    shaders = [path for path in folder.rglob("*") if path.suffix in (".comp", ".vert", ".frag")]
+    for path in sorted(shaders, key=lambda path: path.name):
+        yield path, "\n".join(flatten(folder, path, set())) + "\n"
 
 
 def parse_macro(text, where):
@@ -131,17 +132,18 @@ def main():
     macros = set()
     for path, source in shaders_of(options.folder):
         if number := re.search(r"binding\s*=\s*\d.*", source):
-            sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/bindings.glsl")
+            sys.exit(f"{path.name}: '{number.group()}' is no name of glsl/common/bindings.glsl")
         variants = variants_of(path.name, source)
         macros.update(name for variant in variants for name, _, _ in variant)
         symbol = path.name.replace(".", "_")
         # Compilers limit the length of one string literal; adjacent literals are concatenated.
         chunks = [source[i:i + 8000] for i in range(0, len(source), 8000)]
         literal = "\n".join(f'R"glsl({chunk})glsl"' for chunk in chunks)
+        file = path.relative_to(options.folder).as_posix()
         parts.append(f"static constexpr char {symbol}[] =\n{literal};\n")
         parts.append(variant_tables(symbol, variants))
         # The size is stored too, because clang refuses to compute it in a constant this large.
-        entries.append(f'    {{"{path.name}", {{{symbol}, sizeof({symbol}) - 1}}, {symbol}_variants}},')
+        entries.append(f'    {{"{path.name}", "{file}", {{{symbol}, sizeof({symbol}) - 1}}, {symbol}_variants}},')
     parts.append("static constexpr Shader all_shaders[] = {\n" + "\n".join(entries) + "\n};\n")
     parts.append("std::span<const Shader> shaders() { return all_shaders; }\n")
     parts.append("}  // namespace cumulet::gl\n")

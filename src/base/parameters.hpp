@@ -1,9 +1,9 @@
 #pragma once
 
-// glsl/parameters.glsl as C++: the uniform block of every kernel that renders images.
+// glsl/common/parameters.glsl as C++: the uniform block of every kernel that renders images.
 
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
-#include "parameters.glsl"
+#include "common/parameters.glsl"
 }  // namespace cumulet::core

@@ -15,5 +15,5 @@
 
 namespace cumulet::core {
 using namespace glm;  // GLSL's own names: vec3, uvec4, floatBitsToUint, ...
-#include "numbers.glsl"
+#include "common/numbers.glsl"
 }  // namespace cumulet::core

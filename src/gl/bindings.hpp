@@ -1,7 +1,7 @@
 #pragma once
 
-// glsl/bindings.glsl as C++: the binding points that shaders and C++ share.
+// glsl/common/bindings.glsl as C++: the binding points that shaders and C++ share.
 
 namespace cumulet::core {
-#include "bindings.glsl"
+#include "common/bindings.glsl"
 }  // namespace cumulet::core

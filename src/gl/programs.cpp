@@ -43,7 +43,7 @@ std::string source_of(const ShaderFolder* folder, const std::string& name, const
     throw Error(ErrorCode::internal, name + " has no variant with [" + all + "]");
   }
   if (folder == nullptr) return shader->with(defines);
-  const std::string text = folder->source(name);
+  const std::string text = folder->source(shader->path);
   Shader own = *shader;
   own.source = text;
   return own.with(defines);
@@ -168,7 +168,8 @@ void Programs::begin(const ProgramKey& key, Program& program) {
 
 void Programs::log_shader(const std::string& name) {
   if (log_ == nullptr || !logged_shaders_.insert(name).second) return;
-  const bool same = shaders_->source(name) == find_shader(name)->source;
+  const Shader& shader = *find_shader(name);
+  const bool same = shaders_->source(shader.path) == shader.source;
   log_->info("shader " + name + ": read from " + shaders_->given() +
              (same ? ", identical to the library's" : ", differs from the library's"));
 }

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr auto pause = std::chrono::milliseconds(250);
 
-// Returns "x.glsl" if the line includes that file.
+// Returns "grid/cell.glsl" if the line includes that file.
 std::optional<std::string> included(const std::string& line) {
   constexpr std::string_view directive = "#include \"";
   const std::size_t at = line.find_first_not_of(" \t");
@@ -32,8 +32,7 @@ void append(const FilePath& folder, const fs::path& name, std::set<fs::path>& se
   if (!file) throw Error(ErrorCode::file, (folder.given() / name).string() + ": cannot be read");
   for (std::string line; std::getline(file, line);) {
     if (const auto include = included(line)) {
-      const fs::path other = name.parent_path() / *include;
-      if (seen.insert(other).second) append(folder, other, seen, text);
+      if (seen.insert(*include).second) append(folder, *include, seen, text);
     } else {
       text.append(line).append(1, '\n');
     }
@@ -42,10 +41,10 @@ void append(const FilePath& folder, const fs::path& name, std::set<fs::path>& se
 
 }  // namespace
 
-std::string ShaderFolder::source(const std::string& name) const {
+std::string ShaderFolder::source(std::string_view path) const {
   std::string text;
   std::set<fs::path> seen;
-  append(folder_, name, seen, text);
+  append(folder_, path, seen, text);
   return text;
 }
 
@@ -56,7 +55,7 @@ bool ShaderFolder::changed() {
   looked_ = now;
   auto newest = fs::file_time_type::min();
   std::error_code error;
-  for (fs::directory_iterator at(folder_.absolute(), error), end; !error && at != end; at.increment(error)) {
+  for (fs::recursive_directory_iterator at(folder_.absolute(), error), end; !error && at != end; at.increment(error)) {
     std::error_code gone;
     const fs::file_time_type time = at->last_write_time(gone);
     if (!gone) newest = std::max(newest, time);

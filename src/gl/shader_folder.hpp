@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "base/file_path.hpp"
 
@@ -13,8 +14,8 @@ namespace cumulet::gl {
 class ShaderFolder {
  public:
   explicit ShaderFolder(FilePath folder) : folder_(std::move(folder)) {}
-  /// Returns a shader with its includes resolved, like cmake/embed_glsl.py. Throws Error(file).
-  [[nodiscard]] std::string source(const std::string& name) const;
+  /// Returns a shader (Shader::path) with its includes resolved, like cmake/embed_glsl.py. Throws Error(file).
+  [[nodiscard]] std::string source(std::string_view path) const;
   [[nodiscard]] const std::string& given() const { return folder_.given(); }
   /// Whether a file was written since the previous check; false at the first call. Checks the folder a few times per
   /// second at most.

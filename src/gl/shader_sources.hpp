@@ -15,7 +15,8 @@ struct ShaderMacro {
 
 /// A shader of glsl/ with its includes resolved, embedded at build time.
 struct Shader {
-  std::string_view name;
+  std::string_view name;  // of its file, without folders
+  std::string_view path;  // of its file in glsl/
   std::string_view source;
   /// All variants that the library builds, from the "variants:" lines of the shader: each is a set of macros that are
   /// defined together. A shader without such lines has one variant without macros.

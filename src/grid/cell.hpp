@@ -7,10 +7,10 @@
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
-#include "cell.glsl"
-#include "cell_emission.glsl"
-#include "cell_fit.glsl"
-#include "cell_split.glsl"
-#include "clear_cones.glsl"
-#include "lattice.glsl"
+#include "grid/cell.glsl"
+#include "grid/cell_fit.glsl"
+#include "grid/cell_split.glsl"
+#include "grid/clear_cones.glsl"
+#include "grid/lattice.glsl"
+#include "traversal/cell_emission.glsl"
 }  // namespace cumulet::core

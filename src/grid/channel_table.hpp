@@ -42,7 +42,7 @@ struct Channels {
   [[nodiscard]] std::uint64_t bytes() const;
 };
 
-/// Emission of a cell as the shaders read it; layout: glsl/channels.glsl.
+/// Emission of a cell as the shaders read it; layout: glsl/grid/channels.glsl.
 struct EmissionRecord {
   glm::vec3 mean;  ///< radiance per world unit of length
   std::uint32_t gradient;

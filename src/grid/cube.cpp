@@ -23,7 +23,8 @@ Cube fit_cube(const volume::ScalarVolume& volume, const glm::ivec3& bounds_min, 
   const glm::ivec3 low = bounds_min - (interpolated ? 1 : 0);
   std::int64_t extent = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    // glsl/summarize_bricks.comp needs the octant of each brick in its parent cube, hence the alignment to two bricks.
+    // glsl/grid/summarize_bricks.comp needs the octant of each brick in its parent cube, hence the alignment to two
+    // bricks.
     const int step = volume.on_device ? 2 * volume::brick_size : volume::brick_size;
     cube.origin[axis] = low[axis] & ~(step - 1);
     extent = std::max<std::int64_t>(extent, std::int64_t{bounds_max[axis]} - cube.origin[axis] + 1);

@@ -23,9 +23,9 @@ struct Cube {
   glm::dmat4 to_world{1.0};
   Interpolation interpolation = Interpolation::nearest;
 
-  static constexpr int max_log2_size = 18;  // limit of the cell record: glsl/cell.glsl
+  static constexpr int max_log2_size = 18;  // limit of the cell record: glsl/grid/cell.glsl
   [[nodiscard]] int size() const { return 1 << log2_size; }
-  /// Returns true if the cells use the record layout of wide cubes (glsl/cell.glsl).
+  /// Returns true if the cells use the record layout of wide cubes (glsl/grid/cell.glsl).
   [[nodiscard]] bool wide() const;
 };
 

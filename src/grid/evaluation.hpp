@@ -145,7 +145,7 @@ class Evaluation {
   std::array<float, 9> longest_{};                         // maximum of edge_squared_ per level
 };
 
-/// Returns the squared lengths of a brick's refinement edges, CM_LEVEL_EDGES per level (glsl/brick_summary.glsl).
+/// Returns the squared lengths of a brick's refinement edges, CM_LEVEL_EDGES per level (glsl/grid/brick_summary.glsl).
 std::array<float, CM_BRICK_EDGES> brick_edges(const glm::dmat4& to_world);
 
 /// A field that can cause cells to split.

@@ -15,7 +15,7 @@
 namespace cumulet::grid {
 
 /// Entry for a lattice point p of scale m >= 1. It describes the cube of 8^m voxels with its low corner at p and the
-/// octree cube with its center at p. Layout: glsl/lattice.glsl; reader: glsl/lattice_lookup.glsl.
+/// octree cube with its center at p. Layout: glsl/grid/lattice.glsl; reader: glsl/grid/lattice_lookup.glsl.
 struct LatticeEntry {
   std::uint32_t block = 0;   ///< index of the block of the next finer scale in this cube; 0: none
   std::uint32_t brick = 0;   ///< index of the brick with the cube's values, if the cube is a brick or has no finer
@@ -31,7 +31,7 @@ struct CoarseCells {
 };
 static_assert(sizeof(CoarseCells) == 4 * CM_COARSE_WORDS);
 
-/// Source data of a channel's cell records, as Lattice has it for density. Reader: glsl/grid_channels.comp.
+/// Source data of a channel's cell records, as Lattice has it for density. Reader: glsl/grid/grid_channels.comp.
 struct LatticeChannel {
   Channel channel = Channel::emission;
   std::size_t numbers = 0;            ///< values per voxel
@@ -108,7 +108,7 @@ struct Lattice {
 using LatticePtr = std::shared_ptr<const Lattice>;
 
 /// The part of a cell that lies in one voxel, for cells within a brick, in the cell's frame. With interpolation: the
-/// share of the voxel at a lattice point. Readers: glsl/grid_records.comp, glsl/grid_channels.comp.
+/// share of the voxel at a lattice point. Readers: glsl/grid/grid_records.comp, glsl/grid/grid_channels.comp.
 struct CellPart {
   glm::vec3 from_centroid;  ///< from the cell's centroid to this part's centroid, in the cell's units
   std::uint32_t packed;     ///< x | y << 4 | z << 8 | weight << 12; x, y, z: the voxel's low corner, or the lattice

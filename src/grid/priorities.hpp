@@ -26,7 +26,7 @@ const BrickPoints& brick_points();
 using BrickPointIndices = std::array<std::uint16_t, 9 * 9 * 9>;
 const BrickPointIndices& brick_point_indices();
 
-/// GPU-resident bricks. glsl/own_priorities.comp computes their priorities on the GPU.
+/// GPU-resident bricks. glsl/grid/own_priorities.comp computes their priorities on the GPU.
 struct BricksToRate {
   /// Nodes in which this field varies, as numbers relative to first_node. The priority of a node's vertex is the
   /// maximum over its fields.
@@ -51,7 +51,7 @@ struct BricksToRate {
 /// entry has the 16-bit priorities that the cube's own cells give to their split vertices, down to the last level with
 /// any. A view only limits the number of levels per cube. Memory: at most 2 bytes per point of 9^3 per brick.
 struct OwnPriorities {
-  /// Layout: glsl/lattice.glsl.
+  /// Layout: glsl/grid/lattice.glsl.
   using Node = glm::uvec3;
 
   /// Contains everything above the settings' threshold. The camera and the cell budget are not used. Runs in parallel.

@@ -54,7 +54,7 @@ class DiamondSet {
   /// True if max_cells, not the threshold, ended the refinement.
   [[nodiscard]] bool limited() const { return limited_; }
   /// Returns the blocks of 8^3 lattice points that hold all vertices with a non-zero priority, packed as in
-  /// glsl/lattice.glsl, in no particular order.
+  /// glsl/grid/lattice.glsl, in no particular order.
   [[nodiscard]] std::vector<glm::uvec2> blocks(const Progress* progress = nullptr) const;
 
  private:

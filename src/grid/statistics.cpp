@@ -169,7 +169,7 @@ const BrickTree& brick_tree(std::uint32_t frame) {
 }
 
 float BrickSums::reference_of(const float* values) {
-  // The order of additions matches glsl/brick_sums.glsl.
+  // The order of additions matches glsl/grid/brick_sums.glsl.
   std::array<float, 128> sums{};
   for (std::size_t row = 0; row < 64; ++row) {
     for (std::size_t z = 0; z < 8; ++z) sums[64 + row] += values[8 * row + z];

@@ -37,7 +37,7 @@ struct LinearFit {
 };
 
 /// Solves the normal equations with the tetrahedron's own covariance matrix, a constant of its class
-/// (glsl/cell_fit.glsl). covariance: from frame_covariance().
+/// (glsl/grid/cell_fit.glsl). covariance: from frame_covariance().
 LinearFit fit_linear(std::uint32_t cell_class, const glm::vec3& covariance, float mean);
 
 /// Subdivision of a brick's Kuhn tetrahedron (class B, unit 8) into 512 sixths of voxels; one table for each of the 48

@@ -12,7 +12,7 @@
 
 namespace cumulet::grid {
 
-/// One cell as the shaders read it; layout: glsl/cell.glsl.
+/// One cell as the shaders read it; layout: glsl/grid/cell.glsl.
 struct CellRecord {
   glm::uvec4 links;
   glm::uvec4 data;
@@ -25,19 +25,19 @@ EmissionRecord emission_record(const std::array<Moments, 3>& moments, std::uint3
 /// Returns true if any part of the cell emits light.
 bool emits(const std::array<Moments, 3>& moments);
 
-/// Packs the mean scattering color for shaders; layout: glsl/channels.glsl. scattering: mass of density x color. mass:
-/// of density; if it is 0 the color is black.
+/// Packs the mean scattering color for shaders; layout: glsl/grid/channels.glsl. scattering: mass of density x color.
+/// mass: of density; if it is 0 the color is black.
 std::uint32_t pack_color(const glm::dvec3& scattering, double mass);
 
 /// Packs the mean cosine of scattering for shaders, clamped to +-0.999. forward: mass of scattering x (1 + anisotropy)
 /// / 2. scattering: its mass; if it is 0 the cosine is 0.
 std::int16_t pack_anisotropy(double forward, double scattering);
 
-/// Packs the mean velocity along the cube's axes for shaders, in voxels per second; layout: glsl/channels.glsl.
+/// Packs the mean velocity along the cube's axes for shaders, in voxels per second; layout: glsl/grid/channels.glsl.
 /// momentum: mass of each component of MomentumField. mass: of density; if it is 0 the velocity is 0.
 glm::uvec2 pack_velocity(const glm::dvec3& momentum, double mass, float fastest);
 
-/// Packs a density's mean and gradient for shaders; layout: glsl/cell.glsl.
+/// Packs a density's mean and gradient for shaders; layout: glsl/grid/cell.glsl.
 glm::uvec2 pack_fit(const glm::vec4& fit);
 
 /// Start of a root cell's subtree in the leaves and in the tree.

@@ -1,7 +1,7 @@
 #pragma once
 
-// Analytic lights (point, spot, disk, rectangle, distant) of glTF files and of the host, and glsl/punctual.glsl as C++.
-// The raster pass and the path tracer use the same records.
+// Analytic lights (point, spot, disk, rectangle, distant) of glTF files and of the host, and glsl/light/punctual.glsl
+// as C++. The raster pass and the path tracer use the same records.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -14,7 +14,7 @@
 #include "surface/scene.hpp"
 
 namespace cumulet::core {
-#include "punctual.glsl"
+#include "light/punctual.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::light {
@@ -65,8 +65,8 @@ double share_looks(std::span<core::CmAnalyticLight> records, std::span<const Lit
 /// if there is no such light or no ball.
 std::optional<double> nearest_analytic_light(std::span<const core::CmAnalyticLight> records, const Lit& ball);
 
-/// Whether equiangular sampling of lights (glsl/equiangular.glsl) is worth its time in a medium of this mean optical
-/// depth. Measured: docs/architecture.md.
+/// Whether equiangular sampling of lights (glsl/path/equiangular.glsl) is worth its time in a medium of this mean
+/// optical depth. Measured: docs/architecture.md.
 bool suits_equiangular(std::optional<double> nearest, double optical_depth);
 
 /// Adds these lights to the counts.

@@ -25,10 +25,10 @@ struct EnvironmentPixels {
 };
 
 /// Spherical harmonics of radiance without the mean (order 1 and 2): coefficients of x, y, z, xy, yz, zx, xx - zz and
-/// yy - zz, in the order of glsl/harmonics.glsl.
+/// yy - zz, in the order of glsl/light/harmonics.glsl.
 using Harmonics = std::array<glm::vec3, 8>;
 
-/// An environment map with the tables for importance sampling (glsl/environment.glsl). Immutable and shared.
+/// An environment map with the tables for importance sampling (glsl/light/environment.glsl). Immutable and shared.
 struct Environment {
   static constexpr std::uint32_t max_side = 16384;
 

@@ -11,7 +11,7 @@
 
 namespace cumulet::light {
 
-/// The kinds of glsl/light.glsl.
+/// The kinds of glsl/light/light.glsl.
 enum class Kind { sky, sun, triangle, analytic_light, emissive, environment, cell };
 
 /// The emission of a medium.

@@ -12,8 +12,8 @@
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
-#include "ggx.glsl"
-#include "prefiltered.glsl"
+#include "light/prefiltered.glsl"
+#include "surface/ggx.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::light {

@@ -1,7 +1,7 @@
 #pragma once
 
 // Prefiltered environment maps: the environment convolved with GGX lobes, for rasterized reflections
-// (glsl/prefiltered.glsl). No GL.
+// (glsl/light/prefiltered.glsl). No GL.
 
 #include <cstdint>
 #include <functional>

@@ -12,7 +12,7 @@
 #include "volume/ramp.hpp"
 
 namespace cumulet::core {
-#include "brick_emission.glsl"
+#include "grid/brick_emission.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {
@@ -39,7 +39,7 @@ struct Emission {
   [[nodiscard]] bool is_hot() const { return blackbody > 0.0 && blackbody_tint != glm::vec3(0.0F); }
 };
 
-/// Converts the settings for shaders (glsl/brick_products.comp).
+/// Converts the settings for shaders (glsl/grid/brick_products.comp).
 core::CmBrickEmissive shader_emissive(const Emission& emission, const light::BlackBody& body);
 
 /// Returns flame * strength * color + black-body emission of the temperature: radiance per world unit of length, linear

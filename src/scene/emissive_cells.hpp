@@ -12,7 +12,7 @@
 
 namespace cumulet::scene {
 
-/// An emissive cell, as the shaders read it (glsl/light.glsl).
+/// An emissive cell, as the shaders read it (glsl/light/light.glsl).
 struct GlowingCell {
   light::Alias alias;   ///< entry of the alias table; `other` indexes the same table
   glm::uvec2 v0_shape;  ///< x and y of the cell record: its v0 and shape

@@ -1,6 +1,6 @@
 #pragma once
 
-// Table of the volume instances of a scene for shaders: glsl/instance.glsl. No GL.
+// Table of the volume instances of a scene for shaders: glsl/traversal/instance.glsl. No GL.
 
 #include <glm/glm.hpp>
 #include <optional>
@@ -13,7 +13,7 @@
 #include "scene/threaded_tree.hpp"
 
 namespace cumulet::core {
-#include "instance_table.glsl"
+#include "traversal/instance_table.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

@@ -18,7 +18,7 @@
 #include "scene/threaded_tree.hpp"
 
 namespace cumulet::core {
-#include "surface_tables.glsl"
+#include "surface/surface_tables.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

@@ -57,11 +57,11 @@ struct ModelSource {
   surface::Pose pose;
   std::vector<ModelMesh> meshes;  ///< meshes that have triangles
   std::vector<light::EmissiveTriangle> emissive;
-  std::vector<glm::uvec4> words;  ///< the tables of glsl/surface.glsl, except textures
+  std::vector<glm::uvec4> words;  ///< the tables of glsl/surface/surface.glsl, except textures
   std::uint32_t vertices = 0;     ///< offset of the vertices, which all meshes share
   std::uint32_t materials = 0;
   bool extended_bsdf =
-      false;  ///< visible materials need the extended-material variant CM_EXTENDED_BSDF (glsl/ggx.glsl)
+      false;  ///< visible materials need the extended-material variant CM_EXTENDED_BSDF (glsl/surface/ggx.glsl)
   std::shared_ptr<const TextureImages> images;
   std::shared_ptr<const RasterSource> raster;
   std::vector<glm::vec3> centres;  ///< centers of the raster's blended triangles

@@ -1,6 +1,6 @@
 #pragma once
 
-// Table of the models of a scene for shaders: glsl/model.glsl. No GL.
+// Table of the models of a scene for shaders: glsl/surface/model.glsl. No GL.
 
 #include <cstdint>
 #include <functional>
@@ -15,7 +15,7 @@
 #include "scene/threaded_tree.hpp"
 
 namespace cumulet::core {
-#include "model_table.glsl"
+#include "surface/model_table.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Motion vectors: the transforms of a scene in the previous frame, for shaders (glsl/motion.glsl). No GL.
+// Motion vectors: the transforms of a scene in the previous frame, for shaders (glsl/features/motion.glsl). No GL.
 
 #include <cstdint>
 #include <functional>
@@ -13,7 +13,7 @@
 #include "scene/snapshot.hpp"
 
 namespace cumulet::core {
-#include "motion.glsl"
+#include "features/motion.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

@@ -2,8 +2,8 @@
 
 namespace cumulet::scene {
 
-/// A phase function, as CmPhase of glsl/phase.glsl: a Henyey-Greenstein lobe, and a second lobe of Draine's form with
-/// weight second_weight.
+/// A phase function, as CmPhase of glsl/path/phase.glsl: a Henyey-Greenstein lobe, and a second lobe of Draine's form
+/// with weight second_weight.
 struct Phase {
   float anisotropy = 0.0F;
   float second_anisotropy = 0.0F;

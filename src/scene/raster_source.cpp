@@ -12,7 +12,7 @@
 #include "base/srgb.hpp"
 
 namespace cumulet::core {
-#include "display.glsl"
+#include "display/display.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

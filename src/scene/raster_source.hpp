@@ -14,7 +14,7 @@
 #include "surface/scene.hpp"
 
 namespace cumulet::core {
-#include "surface_parameters.glsl"
+#include "surface/surface_parameters.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

@@ -32,7 +32,7 @@ struct Momentum {
 };
 using Product = std::variant<Emission, Scattering, Forward, Momentum>;
 /// Returns the fields that a product is made of. Except for emission, the first is density, whose bricks the product
-/// has. The order is that of glsl/brick_products.comp.
+/// has. The order is that of glsl/grid/brick_products.comp.
 std::vector<volume::Channel> fields_of(const Product& product);
 
 /// A product in GL; equal to the one in main memory except for rounding.

@@ -9,7 +9,7 @@
 #include "scene/raster_source.hpp"
 
 namespace cumulet::core {
-#include "surface_tables.glsl"
+#include "surface/surface_tables.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

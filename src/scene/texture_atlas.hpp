@@ -28,7 +28,7 @@ using TextureImagesPtr = std::shared_ptr<const TextureImages>;
 /// Throws Error(cancelled).
 TextureImages texture_images(surface::ScenePtr scene, std::uint32_t largest, const Progress* progress = nullptr);
 
-/// Images packed into layers of one size, each stored once: glsl/surface.glsl does the wrapping and filtering.
+/// Images packed into layers of one size, each stored once: glsl/surface/surface.glsl does the wrapping and filtering.
 struct TextureAtlas {
   struct Region {
     glm::uvec2 corner{0U};
@@ -44,7 +44,7 @@ struct TextureAtlas {
 /// log n).
 TextureAtlas pack_atlas(std::span<const TextureImagesPtr> scenes);
 
-/// Returns a word of glsl/surface.glsl's texture table: the image's position in the atlas, and its wrapping and
+/// Returns a word of glsl/surface/surface.glsl's texture table: the image's position in the atlas, and its wrapping and
 /// filtering.
 glm::uvec4 texture_word(const surface::Texture& texture, const TextureAtlas::Region& region);
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// Stackless BVHs over the boxes of a scene's objects, in depth-first order with skip links: glsl/tree_node.glsl. No GL.
+// Stackless BVHs over the boxes of a scene's objects, in depth-first order with skip links: glsl/common/tree_node.glsl.
+// No GL.
 
 #include <array>
 #include <cmath>
@@ -11,7 +12,7 @@
 #include "base/parameters.hpp"
 
 namespace cumulet::core {
-#include "tree_node.glsl"
+#include "common/tree_node.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::scene {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Bounding volume hierarchy over triangles, for the rays of glsl/bvh.glsl. Does not use GL.
+// Bounding volume hierarchy over triangles, for the rays of glsl/surface/bvh.glsl. Does not use GL.
 
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace cumulet::surface {
 
-/// Flags of a triangle for ray intersection, one word per triangle: CM_TRIANGLE_* of glsl/bvh.glsl.
+/// Flags of a triangle for ray intersection, one word per triangle: CM_TRIANGLE_* of glsl/surface/bvh.glsl.
 struct TriangleFlags {
   static constexpr std::uint32_t ask = 0x80000000U;        ///< alpha or transmission: the shader's cm_hit_accept
                                                            ///< accepts or rejects a hit

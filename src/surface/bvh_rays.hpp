@@ -1,6 +1,6 @@
 #pragma once
 
-// Compiles glsl/bvh.glsl as C++, so that CPU code traces the same rays over the same tree.
+// Compiles glsl/surface/bvh.glsl as C++, so that CPU code traces the same rays over the same tree.
 
 #include <cstring>
 
@@ -21,7 +21,7 @@ struct BvhRays {
     std::memcpy(&words, static_cast<const unsigned char*>(texels) + std::size_t{texel} * sizeof words, sizeof words);
     return words;
   }
-#include "bvh.glsl"
+#include "surface/bvh.glsl"
 
   static_assert(CM_BVH_STACK == surface::Bvh::max_depth && CM_BVH_LEAF == surface::Bvh::leaf_bit);
   static_assert(CM_TRIANGLE_ASK == surface::TriangleFlags::ask &&

@@ -5,7 +5,7 @@
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
-#include "ggx.glsl"
+#include "surface/ggx.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::surface {

@@ -6,8 +6,8 @@
 
 namespace cumulet::surface {
 
-/// Directional albedo of a GGX lobe of glsl/ggx.glsl: f0 x + f90 y, from the two sums of Karis, "Real Shading in Unreal
-/// Engine 4", SIGGRAPH 2013. Shaders and C++ share one table, interpolated linearly.
+/// Directional albedo of a GGX lobe of glsl/surface/ggx.glsl: f0 x + f90 y, from the two sums of Karis, "Real Shading
+/// in Unreal Engine 4", SIGGRAPH 2013. Shaders and C++ share one table, interpolated linearly.
 class GgxAlbedo {
  public:
   /// Returns the table, which the first call computes. Thread-safe.

@@ -106,7 +106,7 @@ struct Material {
 /// Returns true if the triangles are the boundary of a volume that light enters by transmission (KHR_materials_volume).
 /// Both sides of such triangles are hit.
 inline bool bounds_volume(const Material& m) { return m.transmission > 0.0F && m.thickness > 0.0F && !m.unlit; }
-/// Returns true if the path tracer needs its extended-material variant (CM_EXTENDED_BSDF of glsl/ggx.glsl).
+/// Returns true if the path tracer needs its extended-material variant (CM_EXTENDED_BSDF of glsl/surface/ggx.glsl).
 inline bool has_extended_bsdf(const Material& m) {
   return !m.unlit &&
          (m.transmission > 0.0F || m.sheen_color != glm::vec3(0.0F) || m.anisotropy > 0.0F || m.iridescence > 0.0F);

@@ -6,7 +6,7 @@
 #include "base/shared_code.hpp"
 
 namespace cumulet::core {
-#include "sheen.glsl"
+#include "surface/sheen.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::surface {

@@ -5,7 +5,7 @@
 
 namespace cumulet::surface {
 
-/// Directional albedo of white sheen (glsl/sheen.glsl) by roughness, for sheen as GgxAlbedo for GGX. Immutable.
+/// Directional albedo of white sheen (glsl/surface/sheen.glsl) by roughness, for sheen as GgxAlbedo for GGX. Immutable.
 class SheenAlbedo {
  public:
   static const SheenAlbedo& table();
@@ -14,8 +14,8 @@ class SheenAlbedo {
   [[nodiscard]] float towards(float roughness, float cosine) const;
   [[nodiscard]] float average(float roughness) const;
 
-  /// Data in the layout of glsl/surface.glsl: the four corners of each cell, row by row; then both ends of each row's
-  /// average.
+  /// Data in the layout of glsl/surface/surface.glsl: the four corners of each cell, row by row; then both ends of each
+  /// row's average.
   [[nodiscard]] std::vector<glm::uvec4> words() const;
 
  private:

@@ -8,7 +8,7 @@
 #include "base/srgb.hpp"
 
 namespace cumulet::core {
-#include "display.glsl"
+#include "display/display.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::surface::detail {

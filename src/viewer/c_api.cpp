@@ -5,7 +5,7 @@
 
 #include "base/library_thread.hpp"
 #include "base/murmur_hash.hpp"
-#include "render/mattes.hpp"
+#include "render/film/mattes.hpp"
 #include "settings/aov_table.hpp"
 #include "settings/ramp.hpp"
 #include "viewer/c_lights.hpp"

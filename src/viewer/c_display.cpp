@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "render/display_lut.hpp"
+#include "render/passes/display_lut.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_viewer.hpp"
 

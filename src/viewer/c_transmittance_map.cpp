@@ -68,7 +68,7 @@ cumulet_status cumulet_destroy_transmittance_map(cumulet_viewer* viewer, uint32_
   });
 }
 
-// GLSL lookup for a point. Directions are mapped as in glsl/transmittance.comp: texels lie on the folds of the
+// GLSL lookup for a point. Directions are mapped as in glsl/features/transmittance.comp: texels lie on the folds of the
 // octahedron, and the first and last distances are at the centers of slices.
 const char* cumulet_transmittance_map_glsl(void) {
   return R"(float cumulet_transmittance(sampler3D map, mat4 to_map, vec2 range, vec3 world) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "assets/live.hpp"
-#include "render/voxel_transfers.hpp"
+#include "render/dynamic/voxel_transfers.hpp"
 #include "scene/channels.hpp"
 #include "scene/state_in_gl.hpp"
 #include "volume/memory.hpp"

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "gl/api.hpp"
-#include "render/display.hpp"
-#include "render/feature_buffers.hpp"
-#include "render/host_depth.hpp"
+#include "render/film/feature_buffers.hpp"
+#include "render/passes/display.hpp"
+#include "render/raster/host_depth.hpp"
 #include "scene/snapshot.hpp"
 
 namespace cumulet::viewer {

@@ -10,9 +10,9 @@
 #include "base/error.hpp"
 #include "base/milliseconds.hpp"
 #include "gl/transient_framebuffer.hpp"
-#include "render/checkpoint.hpp"
-#include "render/denoised.hpp"
-#include "render/wavelet.hpp"
+#include "render/film/checkpoint.hpp"
+#include "render/passes/denoised.hpp"
+#include "render/passes/wavelet.hpp"
 #include "settings/aov_table.hpp"
 #include "viewer/context.hpp"
 

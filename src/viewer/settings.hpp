@@ -9,8 +9,8 @@
 #include <glm/gtc/type_ptr.hpp>
 #include <optional>
 
-#include "render/display.hpp"
-#include "render/picture_settings.hpp"
+#include "render/film/picture_settings.hpp"
+#include "render/passes/display.hpp"
 #include "stage/settings.hpp"
 
 namespace cumulet::viewer {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "gl/programs.hpp"
-#include "render/device_memories.hpp"
+#include "render/dynamic/device_memories.hpp"
 
 namespace cumulet::viewer {
 

@@ -11,7 +11,7 @@
 #include "base/milliseconds.hpp"
 #include "base/one_line.hpp"
 #include "jobs/build_grid.hpp"
-#include "render/display.hpp"
+#include "render/passes/display.hpp"
 #include "viewer/viewer.hpp"
 
 namespace cumulet::viewer {

@@ -16,7 +16,7 @@
 #include "volume/brick_values.hpp"
 
 namespace cumulet::core {
-#include "brick_summary.glsl"
+#include "grid/brick_summary.glsl"
 }  // namespace cumulet::core
 
 namespace cumulet::volume {

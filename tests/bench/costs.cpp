@@ -156,27 +156,28 @@ scene::ModelSourcePtr emitter_at(const Position& position, double side, float ra
 
 // Disables the emission that scattered rays accumulate along their path, and adds it only at collisions (emission
 // divided by extinction).
-constexpr Edit no_way = {"free_flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n", ""};
-constexpr Edit where_they_collide = {"free_flight.glsl",
+constexpr Edit no_way = {"path/free_flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n",
+                         ""};
+constexpr Edit where_they_collide = {"path/free_flight.glsl",
                                      "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
                                      "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
                                      "    if (way < left) emitted += emission.mean * (there / max(cm_segment_at(e, way "
                                      "/ max(span, 1e-30f)), 1e-30f));\n"};
 // Disables NEE of emissive cells: if there is no other light, or among other lights.
-constexpr Edit no_looks_alone = {"path.glsl", "arrived && cm.lights.any != 0u;",
+constexpr Edit no_looks_alone = {"path/path.glsl", "arrived && cm.lights.any != 0u;",
                                  "arrived && cm.lights.any != 0u && cm.lights.cell_probability < 1.0f;"};
-constexpr Edit no_looks = {"light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_probability,",
+constexpr Edit no_looks = {"light/light.glsl", "LIGHT(CM_LIGHT_CELL, cm.lights.cell_probability,",
                            "LIGHT(CM_LIGHT_CELL, min(0.0f, cm.lights.cell_probability),"};
-constexpr Edit flights_have_all = {"free_flight.glsl", "cm.lights.cell_probability * cm_nee_probability(",
+constexpr Edit flights_have_all = {"path/free_flight.glsl", "cm.lights.cell_probability * cm_nee_probability(",
                                    "0.0f * cm_nee_probability("};
 // Disables Russian roulette of shadow rays.
-constexpr Edit all_looks = {"light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
+constexpr Edit all_looks = {"light/light.glsl", "  if (p.start != CM_IN_MEDIUM) return 1.0f;\n",
                             "  if (p.steps >= 0u) return 1.0f;\n"};
 
 // Samples all lights with equal probability.
 constexpr Edit any_analytic_light = {
-    "light.glsl", "  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;\n", ""};
-constexpr Edit all_alike = {"light.glsl", "  light.pdf = analytic_light.probability;\n",
+    "light/light.glsl", "  if (pick.y > cm_analytic_light(i).stays) i = cm_analytic_light(i).other;\n", ""};
+constexpr Edit all_alike = {"light/light.glsl", "  light.pdf = analytic_light.probability;\n",
                             "  light.pdf = 1.0f / float(max(cm.analytic_lights.count, 1u));\n"};
 
 /// Lights as on a film set: a key light at the side, one with a tenth of its power opposite, and fourteen like the key

@@ -24,7 +24,8 @@ std::filesystem::path source_folder(const char* built, const char* variable) {
 }
 
 EditedShaders::EditedShaders(std::span<const Edit> edits, std::span<const std::filesystem::path> files) {
-  std::filesystem::copy(source_folder(CUMULET_GLSL_DIR, "CUMULET_BENCH_GLSL"), folder_.path());
+  std::filesystem::copy(source_folder(CUMULET_GLSL_DIR, "CUMULET_BENCH_GLSL"), folder_.path(),
+                        std::filesystem::copy_options::recursive);
   for (const std::filesystem::path& file : files) std::filesystem::copy(file, folder_ / file.filename().string());
   for (const Edit& edit : edits) {
     const std::filesystem::path path = folder_ / edit.file;

@@ -28,7 +28,7 @@
 #include "base/milliseconds.hpp"
 #include "gl/state_guard.hpp"
 #include "grid/grid_builder.hpp"
-#include "render/grid_build.hpp"
+#include "render/grid/grid_build.hpp"
 #include "volume/frame_import.hpp"
 
 namespace {

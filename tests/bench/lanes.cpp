@@ -147,7 +147,7 @@ class Warp {
   void fill(std::deque<Place>& places) {
     for (Lane& lane : lanes_) take(lane, places);
   }
-  /// Begins the next work, in the order of glsl/run.glsl. Returns false when the rounds are over.
+  /// Begins the next work, in the order of glsl/path/run.glsl. Returns false when the rounds are over.
   bool begin(const Policy& policy, std::deque<Place>& places, Sums& sums) {
     rest = latency = 0.0;
     while (!done()) {

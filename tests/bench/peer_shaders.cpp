@@ -10,7 +10,7 @@ namespace cumulet::bench {
 
 namespace {
 
-constexpr const char* march = "#include \"march_voxel.glsl\"";
+constexpr const char* march = "#include \"traversal/march_voxel.glsl\"";
 constexpr const char* fly_begins = "// Marches at most CM_CHUNK cells.";
 constexpr const char* fly_ends = "// What the path does once its ray has come to an event.";
 
@@ -25,13 +25,13 @@ std::unique_ptr<EditedShaders> peer_shaders(NanoType type, Look look) {
                                   "\n#include \"flight_hdda.glsl\"\n#if 0\n" + fly_begins;
   const std::string after_flight = std::string("#endif\n") + fly_ends;
   const std::array edits{
-      Edit{"march.glsl", march, with_type.c_str()},
-      Edit{"free_flight.glsl", fly_begins, with_flight.c_str()},
-      Edit{"free_flight.glsl", fly_ends, after_flight.c_str()},
+      Edit{"traversal/march.glsl", march, with_type.c_str()},
+      Edit{"path/free_flight.glsl", fly_begins, with_flight.c_str()},
+      Edit{"path/free_flight.glsl", fly_ends, after_flight.c_str()},
       // No transmittance is known: that of a shadow ray is in its radiance, and depths are those of majorants.
-      Edit{"path.glsl", "  float depth = p.depth_0 - p.depth;\n", "  float depth = 0.0f;\n"},
-      Edit{"path_vertex.glsl", "#define CM_SHADOW_DEPTH 2.0f", "#define CM_SHADOW_DEPTH 0.0f"},
-      Edit{"path.glsl", "  p.depth = p.depth_0;\n  float ground = ",
+      Edit{"path/path.glsl", "  float depth = p.depth_0 - p.depth;\n", "  float depth = 0.0f;\n"},
+      Edit{"path/path_vertex.glsl", "#define CM_SHADOW_DEPTH 2.0f", "#define CM_SHADOW_DEPTH 0.0f"},
+      Edit{"path/path.glsl", "  p.depth = p.depth_0;\n  float ground = ",
            "  p.depth = p.depth_0;\n  if (to_light) p.depth_0 = 1.0f;\n  float ground = "},
   };
   const std::filesystem::path ours = source_folder(CUMULET_BENCH_DIR, "CUMULET_BENCH_PEERS");

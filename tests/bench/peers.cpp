@@ -60,7 +60,8 @@ Entry peer(headless::Context& context, const Asset& asset, NanoType type, Look l
 /// Measures the same cells without clear cones. Rays continue to the bounds, which shows the savings by clear cones.
 Entry to_the_box(headless::Context& context, const Asset& asset, const Entry& tets, const Options& options,
                  double density_scale) {
-  const std::array edits{Edit{"march_tet.glsl", "cm_record_is_clear(data, ray.cone) ? CM_NONE : link", "link"}};
+  const std::array edits{
+      Edit{"traversal/march_tet.glsl", "cm_record_is_clear(data, ray.cone) ? CM_NONE : link", "link"}};
   Entry entry;
   entry.name = tets.name + ", on to the box";
   entry.shaders = std::make_unique<EditedShaders>(edits);

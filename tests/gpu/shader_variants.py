@@ -11,10 +11,10 @@ import sys
 
 # The Russian roulette ends paths with probability 1 - w, and does not divide by w.
 PAPER_RULES = [
-    ("path.glsl",
+    ("path/path.glsl",
      "float survival = strongest < 0.5f && !(grounded && p.bounces == 1u) ? max(strongest, 0.05f) : 1.0f;",
      "float survival = min(strongest, 1.0f);"),
-    ("path.glsl", "  p.throughput = p.throughput / survival;\n", ""),
+    ("path/path.glsl", "  p.throughput = p.throughput / survival;\n", ""),
 ]
 
 
@@ -28,8 +28,7 @@ def main(glsl, paper, out):
         if text.count(old) != 1:
             sys.exit(f"{name}: is not once there: {old}")
         path.write_text(text.replace(old, new))
-    for path in paper.iterdir():
-        shutil.copy(path, out / "paper_kernel" / path.name)
+    shutil.copytree(paper, out / "paper_kernel", dirs_exist_ok=True)
 
 
 main(*map(pathlib.Path, sys.argv[1:4]))

@@ -87,7 +87,7 @@ std::vector<Variant> covering(const gl::Shader& shader) {
 std::string source_of(const gl::Shader& shader, const std::filesystem::path& folder,
                       const std::vector<std::string>& defines) {
   if (folder.empty()) return shader.with(defines);
-  const std::string text = gl::ShaderFolder(folder).source(std::string(shader.name));
+  const std::string text = gl::ShaderFolder(folder).source(shader.path);
   gl::Shader own = shader;
   own.source = text;
   return own.with(defines);

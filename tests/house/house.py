@@ -77,7 +77,7 @@ def read_folders(root):
     for line, row in table_rows(file.read_text(encoding="utf-8") if file.exists() else ""):
         where = f"{PAGE}:{line}"
         path = row.get("Folder", "").strip("`").rstrip("/")
-        name = path.split("/")[-1]
+        name = path.removeprefix("src/")
         above = [folder.name for folder in folders]
         allowed = row.get("May include", "")
         names = above if allowed == "all above" else re.findall(r"`([^`]+)`", allowed)

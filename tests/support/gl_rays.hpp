@@ -29,13 +29,13 @@ struct GlHit {
 };
 static_assert(sizeof(GlRay) == 32 && sizeof(GlHit) == 32);
 
-/// Runs glsl/bvh.glsl in a compute shader. Throws after GL errors.
+/// Runs glsl/surface/bvh.glsl in a compute shader. Throws after GL errors.
 class GlRays {
  public:
   /// accept: the body of cm_hit_accept, "" for none. The context is current.
   GlRays(headless::Context& context, const std::string& accept)
       : gl_(gl::load_functions(headless::Context::get_proc, &context)) {
-    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n" + glsl_file("shared.glsl") + R"(
+    std::string text = "#version 450\nlayout(local_size_x = 64) in;\n" + glsl_file("common/shared.glsl") + R"(
 layout(binding = 0) uniform usamplerBuffer nodes;
 layout(binding = 1) uniform usamplerBuffer triangles;
 struct Ray { vec4 from; vec4 along; };
@@ -48,7 +48,7 @@ uvec4 cm_bvh_triangle(uint texel) { return texelFetch(triangles, int(texel)); }
     if (!accept.empty()) {
       text += "#define CM_HIT_ACCEPT\nbool cm_hit_accept(uint triangle, vec2 barycentrics) { " + accept + " }\n";
     }
-    text += glsl_file("bvh.glsl") + R"(
+    text += glsl_file("surface/bvh.glsl") + R"(
 void main() {
   uint i = gl_GlobalInvocationID.x;
   if (i >= rays.length()) return;

@@ -6,7 +6,7 @@
 #include <memory>
 #include <numbers>
 
-#include "render/model_data.hpp"
+#include "render/scene/model_data.hpp"
 #include "support/meshes.hpp"
 
 namespace cumulet::test {

@@ -1,6 +1,6 @@
 // Accumulation: tiles, passes and the noise target, without GL.
 
-#include "render/accumulation.hpp"
+#include "render/film/accumulation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Adaptive sampling: which pixels get more samples, compared with Neyman allocation in closed form.
 
-#include "render/allotment.hpp"
+#include "render/film/allotment.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 
 #include "gl/state_guard.hpp"
 #include "image.hpp"
-#include "render/compositor.hpp"
+#include "render/passes/compositor.hpp"
 #include "straight_alpha.hpp"
 #include "support/flat_picture.hpp"
 #include "support/gl_state.hpp"

@@ -33,7 +33,7 @@ struct MaskedTexels {
   [[nodiscard]] static bool cm_hit_accept(uint /*triangle*/, vec2 barycentrics) { return barycentrics.x > 0.5F; }
 };
 struct MaskedRays : MaskedTexels {
-#include "bvh.glsl"
+#include "surface/bvh.glsl"
 };
 }  // namespace cumulet::test
 #undef CM_HIT_ACCEPT

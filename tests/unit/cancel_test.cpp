@@ -23,7 +23,7 @@
 #include "base/progress.hpp"
 #include "grid/grid_builder.hpp"
 #include "light/environment_file.hpp"
-#include "render/model_data.hpp"
+#include "render/scene/model_data.hpp"
 #include "support/c_host.hpp"
 #include "support/folder.hpp"
 #include "support/gltf_seeds.hpp"

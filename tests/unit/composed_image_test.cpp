@@ -1,6 +1,6 @@
 // Drawing an image again: copied if nothing changed, composed only in the rows that changed.
 
-#include "render/composed.hpp"
+#include "render/passes/composed.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 #include "cumulet/cumulet.h"
 #include "gl/state_guard.hpp"
-#include "render/compositor.hpp"
+#include "render/passes/compositor.hpp"
 #include "support/c_host.hpp"
 #include "support/flat_picture.hpp"
 #include "support/gl_state.hpp"

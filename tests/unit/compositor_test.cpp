@@ -1,6 +1,6 @@
 // Display of an image in the host's framebuffer, compared pixel by pixel with a CPU evaluation.
 
-#include "render/compositor.hpp"
+#include "render/passes/compositor.hpp"
 
 #include <gtest/gtest.h>
 

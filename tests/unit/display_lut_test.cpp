@@ -12,7 +12,7 @@
 #include <random>
 #include <vector>
 
-#include "render/display.hpp"
+#include "render/passes/display.hpp"
 #include "support/c_viewer.hpp"
 
 namespace {

@@ -1,6 +1,6 @@
 // Tone curves and encodings of the shaders, as C++, compared with those of the PNG writer.
 
-#include "render/display.hpp"
+#include "render/passes/display.hpp"
 
 #include <gtest/gtest.h>
 

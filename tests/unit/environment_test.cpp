@@ -28,8 +28,8 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
 namespace cumulet::core {
-#include "ggx.glsl"
-#include "prefiltered.glsl"
+#include "light/prefiltered.glsl"
+#include "surface/ggx.glsl"
 
 /// The shaders' path tracer over voxels with an environment, compiled as C++.
 struct CpuEnvironment {

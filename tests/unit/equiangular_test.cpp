@@ -1,5 +1,5 @@
-// Equiangular sampling of lights along rays (glsl/equiangular.glsl): the same mean as without it, together with all
-// other lights, and less noise. analytic_lights_test has closed forms.
+// Equiangular sampling of lights along rays (glsl/path/equiangular.glsl): the same mean as without it, together with
+// all other lights, and less noise. analytic_lights_test has closed forms.
 //
 // Kernels use it depending on the lights and the medium's optical depth. If the only light is outside of a medium that
 // is not thin, they use it once another light is inside. Here that light is so faint that it changes nothing else.

@@ -1,4 +1,4 @@
-#include "render/film.hpp"
+#include "render/film/film.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
-#include "render/feature_buffers.hpp"
+#include "render/film/feature_buffers.hpp"
 #include "support/gl_state.hpp"
 
 namespace {

@@ -73,7 +73,7 @@ class FloatClassesShader : public test::GlTest {};
 CUMULET_ON_BACKENDS(FloatClassesShader);
 
 TEST_P(FloatClassesShader, ShaderClassifiesEveryKindOfFloat) {
-  const std::string text = "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("numbers.glsl") + R"(
+  const std::string text = "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("common/numbers.glsl") + R"(
 layout(std430, binding = 0) buffer Floats { float floats[]; };
 layout(std430, binding = 1) buffer Words { uint words[]; };
 uint bit(bool value, int index) { return value ? 1u << index : 0u; }

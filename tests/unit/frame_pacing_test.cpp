@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "base/milliseconds.hpp"
-#include "render/dispatch_pacer.hpp"
+#include "render/pacing/dispatch_pacer.hpp"
 #include "support/busy_host.hpp"
 #include "support/c_host.hpp"
 #include "support/fake_gl.hpp"

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "base/error.hpp"
-#include "render/compositor.hpp"
-#include "render/host_depth.hpp"
+#include "render/passes/compositor.hpp"
+#include "render/raster/host_depth.hpp"
 #include "support/gl_state.hpp"
 #include "support/scrambling_host.hpp"
 

@@ -1,7 +1,7 @@
 // Large data is uploaded in pieces: at most one per frame if the budget is used up, and a partly uploaded pose is never
 // displayed.
 
-#include "render/upload.hpp"
+#include "render/pacing/upload.hpp"
 
 #include <gtest/gtest.h>
 

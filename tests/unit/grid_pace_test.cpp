@@ -1,6 +1,6 @@
 // The estimated time of the dispatches that build a grid.
 
-#include "render/grid_pace.hpp"
+#include "render/pacing/grid_pace.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Grids of a set share buffers. Shaders find each grid's data for any neighbors and any number of pages, and grids that
 // are already uploaded are not uploaded again.
 
-#include "render/march_data.hpp"
+#include "render/scene/march_data.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 
 #include "base/error.hpp"
 #include "gl/bindings.hpp"
-#include "render/path_features.hpp"
+#include "render/film/path_features.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_compute.hpp"
 #include "support/gl_state.hpp"

@@ -1,7 +1,7 @@
 // Conversion of the host's depth buffer to view depth: a known scene, drawn with plain GL, compared with its analytic
 // depth.
 
-#include "render/host_depth.hpp"
+#include "render/raster/host_depth.hpp"
 
 #include <gtest/gtest.h>
 

@@ -19,9 +19,9 @@ using namespace cumulet::test::instances;
 class GlInstanceTree : public test::GlTest {
  protected:
   static std::string head() {
-    return "#version 450\n" + test::glsl_file("shared.glsl") + test::glsl_file("bindings.glsl") +
-           test::glsl_file("parameters.glsl") + test::glsl_file("instance_table.glsl") +
-           test::glsl_file("instance.glsl");
+    return "#version 450\n" + test::glsl_file("common/shared.glsl") + test::glsl_file("common/bindings.glsl") +
+           test::glsl_file("common/parameters.glsl") + test::glsl_file("traversal/instance_table.glsl") +
+           test::glsl_file("traversal/instance.glsl");
   }
 };
 CUMULET_ON_BACKENDS(GlInstanceTree);

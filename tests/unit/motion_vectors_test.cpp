@@ -161,7 +161,7 @@ class MotionVectors : public CViewerTest {
     double most = 0.0;
     for (std::uint32_t y = 0; y < height; ++y) {
       for (std::uint32_t x = 0; x < width; ++x) {
-        // The volume's motion is the mean over the 16 rays of glsl/aovs.comp.
+        // The volume's motion is the mean over the 16 rays of glsl/features/aovs.comp.
         const int rays = aov == CUMULET_AOV_VOLUME_MOTION ? 16 : 1;
         dvec2 wanted(0.0);
         bool known = true;

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "render/display_lut.hpp"
+#include "render/passes/display_lut.hpp"
 #include "support/folder.hpp"
 
 namespace {

@@ -1,6 +1,6 @@
 // The programs that follow from the features of a picture are variants that the shaders declare.
 
-#include "render/path_features.hpp"
+#include "render/film/path_features.hpp"
 
 #include <gtest/gtest.h>
 

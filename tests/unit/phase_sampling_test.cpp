@@ -12,8 +12,8 @@
 #include "scene/phase.hpp"
 
 namespace cumulet::core {
-#include "phase.glsl"
-#include "random.glsl"
+#include "common/random.glsl"
+#include "path/phase.glsl"
 }  // namespace cumulet::core
 
 namespace {

@@ -215,8 +215,8 @@ TEST_F(ProgramsTest, DamagedBinariesAreIgnoredAndRewritten) {
 }
 
 TEST_F(ProgramsTest, ShadersOfAFolderAreReloaded) {
-  fs::copy(CUMULET_GLSL_DIR, folder_.path());
-  const fs::path file = folder_ / "resolve.comp";
+  fs::copy(CUMULET_GLSL_DIR, folder_.path(), fs::copy_options::recursive);
+  const fs::path file = folder_ / "display/resolve.comp";
   const auto original = bytes_of(file);
   const auto edit = [&](const std::string& more) {
     auto bytes = original;

@@ -1,7 +1,7 @@
 // Render regions (crop windows): pixels inside are bit-identical to those of the whole image, and nothing else is
 // rendered.
 
-#include "render/region.hpp"
+#include "render/pacing/region.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "render/schedule.hpp"
+#include "render/pacing/schedule.hpp"
 
 #include <gtest/gtest.h>
 

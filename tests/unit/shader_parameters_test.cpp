@@ -1,6 +1,6 @@
-// glsl/parameters.glsl is one source for GLSL and C++. Tests that drivers lay it out as C++ does.
+// glsl/common/parameters.glsl is one source for GLSL and C++. Tests that drivers lay it out as C++ does.
 
-#include "render/parameters.hpp"
+#include "render/scene/parameters.hpp"
 
 #include <gtest/gtest.h>
 
@@ -167,8 +167,8 @@ std::string word_of(const Field& field, std::size_t i) {
 
 // The shader's source up to the block.
 std::string head() {
-  return "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("bindings.glsl") +
-         test::glsl_file("parameters.glsl");
+  return "#version 450\nlayout(local_size_x = 1) in;\n" + test::glsl_file("common/bindings.glsl") +
+         test::glsl_file("common/parameters.glsl");
 }
 
 TEST_P(ShaderParameters, FieldOffsetsMatchBetweenCppAndGlsl) {

@@ -1,6 +1,6 @@
 // The raster pass for surfaces: scenes built in code, compared with analytic depth and radiance.
 
-#include "render/surface_raster.hpp"
+#include "render/raster/surface_raster.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
-#include "render/progressive.hpp"
+#include "render/frame/progressive.hpp"
 #include "support/gl_state.hpp"
 #include "support/scrambling_host.hpp"
 #include "support/surface_rasters.hpp"

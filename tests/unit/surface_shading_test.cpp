@@ -1,6 +1,6 @@
 // Shading and textures of the raster pass for surfaces, compared with radiance in closed form.
 
-#include "render/surface_raster.hpp"
+#include "render/raster/surface_raster.hpp"
 
 #include <gtest/gtest.h>
 

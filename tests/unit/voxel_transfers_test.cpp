@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gl/state_guard.hpp"
-#include "render/voxel_transfers.hpp"
+#include "render/dynamic/voxel_transfers.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
 #include "support/live_gl_states.hpp"

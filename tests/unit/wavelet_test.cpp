@@ -1,6 +1,6 @@
 // The wavelet filter on images with known noise: means are kept and the noise is reduced.
 
-#include "render/wavelet.hpp"
+#include "render/passes/wavelet.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// GLSL's types and functions for CUDA, so that nvcc compiles the shaders' shared files (glsl/shared.glsl). Types are
+// GLSL's types and functions for CUDA, so that nvcc compiles the shaders' shared files (glsl/common/shared.glsl). Types are
 // GLM's. The functions here are one instruction in GLSL, and several in GLM.
 #pragma once
 
@@ -55,5 +55,5 @@ CM_FN vec2 unpackHalf2x16(uint word) {
   return vec2(pair.x, pair.y);
 }
 
-#include "numbers.glsl"
+#include "common/numbers.glsl"
 }  // namespace cumulet::core

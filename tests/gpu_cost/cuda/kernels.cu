@@ -8,14 +8,14 @@ namespace cumulet::core {
 #define CM_MARCH 0
 #define CM_PAGES 1
 #define CM_KEEPS_ENTRY 1
-#include "bindings.glsl"
-#include "parameters.glsl"
+#include "common/bindings.glsl"
+#include "common/parameters.glsl"
 __constant__ CmParameters cm;
-#include "current_volume.glsl"
+#include "traversal/current_volume.glsl"
 
-#include "cell.glsl"
-#include "phase.glsl"
-#include "random.glsl"
+#include "grid/cell.glsl"
+#include "path/phase.glsl"
+#include "common/random.glsl"
 
 __constant__ cudaTextureObject_t cm_cells;
 __constant__ cudaTextureObject_t cm_tree_words;
@@ -36,8 +36,8 @@ CM_FN float cm_surface_z(uvec2 pixel, vec2 within, uint layer) {
   return tex2DLayered<float>(cm_surface, at.x, at.y, int(layer % cm.host_depth.layers));
 }
 
-#include "march.glsl"
-#include "path_state.glsl"
+#include "traversal/march.glsl"
+#include "path/path_state.glsl"
 
 __device__ CmPath* cm_lane_paths;
 __device__ CmPixel* cm_pixels;
@@ -55,7 +55,7 @@ CM_FN void cm_take_next_slot(CmPath& p, uint& samples) {
   p.stage = p.slot < cm.dispatch.slots ? CM_STAGE_CAMERA : CM_STAGE_DONE;
   samples = 0u;
 }
-#include "run.glsl"
+#include "path/run.glsl"
 
 // As in trace.comp: constants for the fields that only triangles use.
 CM_FN void cm_forget_triangles(CmPath& p) {

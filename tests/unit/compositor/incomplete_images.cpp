@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gl/state_guard.hpp"
-#include "render/compositor.hpp"
+#include "render/passes/compositor.hpp"
 #include "support/busy_host.hpp"
 #include "support/compositing.hpp"
 #include "support/gl_state.hpp"

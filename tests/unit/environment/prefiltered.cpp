@@ -18,8 +18,8 @@
 #include "support/volumes.hpp"
 
 namespace cumulet::core {
-#include "ggx.glsl"
-#include "prefiltered.glsl"
+#include "light/prefiltered.glsl"
+#include "surface/ggx.glsl"
 }  // namespace cumulet::core
 
 namespace {

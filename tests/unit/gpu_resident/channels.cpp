@@ -6,8 +6,8 @@
 
 #include "gl/state_guard.hpp"
 #include "grid/tet_grid.hpp"
-#include "render/grid_build.hpp"
-#include "render/voxel_transfers.hpp"
+#include "render/dynamic/voxel_transfers.hpp"
+#include "render/grid/grid_build.hpp"
 #include "support/gl_state.hpp"
 #include "support/gpu_resident_states.hpp"
 #include "support/grid_reference.hpp"

@@ -10,7 +10,7 @@
 
 #include "base/error.hpp"
 #include "gl/state_guard.hpp"
-#include "render/host_depth.hpp"
+#include "render/raster/host_depth.hpp"
 #include "support/gl_state.hpp"
 #include "support/host_depths.hpp"
 

@@ -20,8 +20,8 @@ inline float cm_sheen_albedo(float roughness, float cosine) {
 }
 inline float cm_sheen_albedo_average(float roughness) { return surface::SheenAlbedo::table().average(roughness); }
 #endif
-#include "bsdf.glsl"
+#include "surface/bsdf.glsl"
 #ifdef CM_EXTENDED_BSDF
-#include "dispersion.glsl"
+#include "path/dispersion.glsl"
 #endif
 }  // namespace cumulet::core

@@ -12,7 +12,7 @@
 
 #include "gl/state_guard.hpp"
 #include "image.hpp"
-#include "render/compositor.hpp"
+#include "render/passes/compositor.hpp"
 #include "support/busy_host.hpp"
 #include "support/gl_state.hpp"
 

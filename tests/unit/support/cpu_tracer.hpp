@@ -8,7 +8,7 @@
 #include "grid/tet_grid.hpp"
 #include "light/alias_table.hpp"
 #include "light/analytic_lights.hpp"
-#include "render/parameters.hpp"
+#include "render/scene/parameters.hpp"
 #include "scene/model_table.hpp"
 #include "support/volumes.hpp"
 #include "surface/ggx_albedo.hpp"

@@ -1,5 +1,5 @@
-// A light that no shader of the library has: a distant disc of finite angle, with the interface that glsl/light.glsl
-// needs. The includer declares
+// A light that no shader of the library has: a distant disc of finite angle, with the interface that
+// glsl/light/light.glsl needs. The includer declares
 //   cm_disc_to           vec3, unit direction to its center, in world space
 //   cm_disc_cosine       float, cosine of its half angle
 //   cm_disc_radiance_in  vec3, its radiance

@@ -15,7 +15,7 @@
 #include "base/error.hpp"
 #include "base/luminance.hpp"
 #include "gl/state_guard.hpp"
-#include "render/wavelet.hpp"
+#include "render/passes/wavelet.hpp"
 #include "support/fake_gl.hpp"
 #include "support/gl_state.hpp"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "gl/objects.hpp"
-#include "render/picture_textures.hpp"
+#include "render/film/picture_textures.hpp"
 
 namespace cumulet::test {
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "gl/state_guard.hpp"
-#include "render/host_depth.hpp"
+#include "render/raster/host_depth.hpp"
 #include "support/gl_state.hpp"
 
 namespace cumulet::test {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Volume instances anywhere, rays at them, and the traversal of glsl/instance.glsl in C++.
+// Volume instances anywhere, rays at them, and the traversal of glsl/traversal/instance.glsl in C++.
 
 #include <algorithm>
 #include <array>
@@ -18,11 +18,11 @@
 
 namespace cumulet::core {
 
-/// glsl/instance.glsl over a table in memory.
+/// glsl/traversal/instance.glsl over a table in memory.
 struct InstanceRays {
   std::span<const CmInstance> cm_instances;
   std::span<const CmInstanceNode> cm_instance_nodes;
-#include "instance.glsl"
+#include "traversal/instance.glsl"
 };
 
 }  // namespace cumulet::core

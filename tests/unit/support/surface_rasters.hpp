@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "gl/state_guard.hpp"
-#include "render/surface_raster.hpp"
+#include "render/raster/surface_raster.hpp"
 #include "support/gl_state.hpp"
 #include "support/surfaces.hpp"
 

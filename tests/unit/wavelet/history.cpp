@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/error.hpp"
-#include "render/wavelet.hpp"
+#include "render/passes/wavelet.hpp"
 #include "support/fake_gl.hpp"
 #include "support/film_samples.hpp"
 #include "support/gl_state.hpp"

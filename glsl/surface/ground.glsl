@@ -1,0 +1,28 @@
+// The ground: an infinite level plane with Lambertian reflection. Rays hit it only from above. Shared by GLSL and C++;
+// the includer has glsl/traversal/ray.glsl.
+#ifndef CM_GROUND_GLSL
+#define CM_GROUND_GLSL
+
+#define CM_NO_GROUND 3.0e38f
+
+// CM_GROUND 0: there is no ground.
+#ifndef CM_GROUND
+#define CM_GROUND 1
+#endif
+
+// Distance along a ray to the ground, CM_NO_GROUND if the ray misses it. o, d: cube space; d per unit of world
+// distance.
+CM_FN float cm_ground_distance(vec3 o, vec3 d) {
+#if CM_GROUND
+  float above = cm_from_cube_point(o).y - cm.ground.height;
+  float t = -above / cm_to_world(d).y;
+  return above > 0.0f && t > 0.0f && t < cm.ground.reach ? t : CM_NO_GROUND;
+#else
+  return CM_NO_GROUND;
+#endif
+}
+
+// Returns true if the ground is the end of a ray that otherwise ends at `reach`.
+CM_FN bool cm_ground_ends(float ground, float reach) { return CM_GROUND != 0 && ground < min(reach, CM_NO_GROUND); }
+
+#endif
