@@ -1,6 +1,7 @@
 #version 450
 // Estimates the noise's variance. A pixel's few samples say little about it (a single one nothing), so its neighbors
-// contribute. Differences between pixels count only if no pixel has two samples.
+// contribute. Differences between pixels count only if no pixel has two samples. If a pixel's own samples differ more
+// than that, their variance counts, so that the filter replaces a pixel with a rare bright sample by its neighbors.
 //
 // Fireflies are dimmed first. A firefly is a pixel much brighter than all similar pixels nearby, and than its own
 // samples make certain. It is dimmed to slightly more than the brightest neighbor; otherwise it would spread as a blob,
@@ -85,6 +86,12 @@ float cm_dimmed(vec4 front, vec4 spread, CmBrightest about) {
   return luminance > room ? room / luminance : 1.0;
 }
 
+// Variance of the mean of a pixel's own samples, after dimming; 0 if it has fewer than two.
+float cm_own_variance(vec4 front, vec4 spread, float dimmed) {
+  float luminance = cm_luminance(front.rgb);
+  return dimmed * dimmed * max(0.0, spread.y - luminance * luminance) / max(spread.z - 1.0, 1.0);
+}
+
 void main() {
   ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, cm_rows.x);
   ivec2 size = textureSize(cm_guides, 0);
@@ -146,7 +153,11 @@ void main() {
     variance = (1.0 + CM_FEW / samples) / samples * vec2(sample_variance, open * (1.0 - open));
   }
   vec4 own = texelFetch(cm_front, texel, 0);
-  if (here.finite) own.rgb *= cm_dimmed(own, spread, about);
+  if (here.finite) {
+    float dimmed = cm_dimmed(own, spread, about);
+    if (own_samples >= 2.0) variance.x = max(variance.x, cm_own_variance(own, spread, dimmed));
+    own.rgb *= dimmed;
+  }
   imageStore(cm_front_out, texel, own);
   imageStore(cm_spread_out, texel, vec4(spread.x, variance, 0.0));
   float own_cover = cm_cover(spread.x);

@@ -231,6 +231,30 @@ TEST_P(WaveletFilter, FirefliesAreRemovedWithoutDots) {
   }
 }
 
+// Fire or sun seen through a thin medium lights the ground by few, bright samples. Pixels that have one are near others
+// that have one.
+TEST_P(WaveletFilter, RareBrightSamplesLeaveNoDots) {
+  constexpr int side = 64;
+  Samples samples(gl_, glm::ivec2(side), 24, [](int, int) { return Pixel{.spread = 0.3F, .z = 5.0F}; });
+  std::mt19937 random(7);
+  std::bernoulli_distribution has_one(0.05);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      if (has_one(random)) samples.add_speck({x, y}, 20.0F);
+    }
+  }
+  const auto clean = samples.filtered(programs_);
+  int dots = 0;
+  for (int y = 1; y < side - 1; ++y) {
+    for (int x = 1; x < side - 1; ++x) {
+      const auto at = [&](int i, int j) { return clean[static_cast<std::size_t>(side * (y + j) + x + i)].x; };
+      const float around = 0.25F * (at(-1, 0) + at(1, 0) + at(0, -1) + at(0, 1));
+      dots += at(0, 0) > 1.2F * around ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(dots, 0);
+}
+
 // A bright pixel whose own samples agree is kept, even in dark surroundings.
 TEST_P(WaveletFilter, BrightPixelsAreKept) {
   const auto scene = [](int x, int y) {
