@@ -437,6 +437,10 @@ TEST(FrameCallDurations, RenderNeverBlocksOnTheGpu) {
   }
 }
 
+bool is_done(const GladGLContext& gl, GLsync sync) {
+  return gl.ClientWaitSync(sync, 0, 0) != GLenum{GL_TIMEOUT_EXPIRED};
+}
+
 // A host that queues much GPU work before each frame and never waits. The viewer does not wait either.
 TEST(FrameCallDurations, RenderNeverBlocksOnTheHostsQueuedWork) {
   headless::Context context = headless::Context::create(headless::Backend::automatic);
@@ -463,13 +467,14 @@ TEST(FrameCallDurations, RenderNeverBlocksOnTheHostsQueuedWork) {
     host.queue();
     const GLsync queued = gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.Flush();
+    if (is_done(gl, queued)) GTEST_SKIP() << "the driver executes within the call (LP_NUM_THREADS=0)";
     std::vector<double> calls;
     for (int i = 0; i < 8; ++i) {
       const auto called = Clock::now();
       ASSERT_EQ(cumulet_render(viewer.get(), &frame, &result), CUMULET_OK);
       calls.push_back(milliseconds(Clock::now() - called));
     }
-    EXPECT_EQ(gl.ClientWaitSync(queued, 0, 0), GLenum{GL_TIMEOUT_EXPIRED}) << "preview " << preview;
+    EXPECT_FALSE(is_done(gl, queued)) << "preview " << preview;
     EXPECT_GT(result.progress, before) << "preview " << preview;
     gl.DeleteSync(queued);
     gl.Finish();
@@ -516,9 +521,10 @@ TEST(FrameCallDurations, RenderDuringADragNeverBlocksOnTheHostsQueuedWork) {
     host.queue();
     const GLsync queued = gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.Flush();
+    if (i == 0 && is_done(gl, queued)) GTEST_SKIP() << "the driver executes within the call (LP_NUM_THREADS=0)";
     const bool rests = i < 6;
     for (int frames = 0; frames < (rests ? 5 : 1); ++frames) render(!rests);
-    EXPECT_EQ(gl.ClientWaitSync(queued, 0, 0), GLenum{GL_TIMEOUT_EXPIRED}) << "frame " << i;
+    EXPECT_FALSE(is_done(gl, queued)) << "frame " << i;
     gl.DeleteSync(queued);
   }
 }
