@@ -402,7 +402,7 @@ class Studio {
     if (!options.stats.empty()) {
       double noise = 0.0;  // stats.noise is the last measured value, so measure now
       check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
-      cumulet::demo::write_stats(options, stats_of(viewer_), context_.name());
+      cumulet::demo::write_stats(options, viewer_, context_.name());
     }
     cumulet::demo::write_picture(viewer_, options, others_, denoised, progress_);
   }

@@ -17,7 +17,10 @@ using Json = nlohmann::ordered_json;
 
 }  // namespace
 
-void write_stats(const RenderOptions& options, const cumulet_stats& stats, const char* backend) {
+void write_stats(const RenderOptions& options, const Viewer& viewer, const char* backend) {
+  const cumulet_stats stats = stats_of(viewer);
+  cumulet_interpolation interpolation{};
+  check(viewer, cumulet_get_interpolation(viewer.get(), &interpolation));
   cumulet_grid_desc grid = options.scene.grid;
   settings::spell_out_zeros(grid);
   const bool tet = grid.type == CUMULET_GRID_TETRAHEDRAL;
@@ -59,7 +62,7 @@ void write_stats(const RenderOptions& options, const cumulet_stats& stats, const
   json["gl"] = {{"vendor", stats.gl_vendor}, {"renderer", stats.gl_renderer}, {"version", stats.gl_version}};
   json["backend"] = backend;
   json["grid_type"] = grid_type_name(grid.type);
-  json["interpolation"] = interpolation_name(grid.interpolation);
+  json["interpolation"] = interpolation_name(interpolation);
   if (tet) json["cells_mode"] = grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
   // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -214,6 +214,13 @@ class Viewer(_methods.ViewerMethods):
             self._call(api.cumulet_get_instance_sequence_frame, pointer, frame, line, len(line))
         return line.value.decode("utf-8", "replace")
 
+    def get_interpolation(self) -> api.Interpolation:
+        """Returns the interpolation between voxels that is in use. C: cumulet_get_interpolation."""
+        used = ctypes.c_int()
+        self._call(api.cumulet_get_interpolation, ctypes.byref(used))
+        interpolation: api.Interpolation = _support.known(api.Interpolation, used.value)
+        return interpolation
+
     # Read-back.
 
     def _read(self, function: Any, floats: int, *arguments: Any) -> memoryview:

@@ -21,6 +21,7 @@ inline constexpr std::array cells_choices = {
     Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "One density per cell: the mean."},
     Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
 inline constexpr std::array voxel_interpolation_choices = {
+    Choice{"auto", CUMULET_INTERPOLATION_AUTO, "Automatic", "Linear; nearest for dynamic volumes in GPU memory."},
     Choice{"nearest", CUMULET_INTERPOLATION_NEAREST, "Nearest", "A voxel is a cube of constant value."},
     Choice{"linear", CUMULET_INTERPOLATION_LINEAR, "Linear", "Trilinear interpolation between the centers of voxels."}};
 inline constexpr std::array criterion_choices = {
@@ -455,10 +456,10 @@ struct Table<cumulet_grid_desc> {
         .row = {.label = "Build on",
                 .tip = "Where the grid is built. The GPU is faster when the camera moves with a camera-adaptive "
                        "grid."}}),
-      Setting(&Desc::interpolation, {.name = "interpolation", .zero = CUMULET_INTERPOLATION_NEAREST,
-        .choices = voxel_interpolation_choices,
+      Setting(&Desc::interpolation, {.name = "interpolation", .choices = voxel_interpolation_choices,
         .key = "grid.interpolation", .flag = "--interpolation",
-        .help = "Interpolation between voxels: constant cubes, or trilinear between their centers (default: nearest)",
+        .help = "Interpolation between voxels: constant cubes, or trilinear between their centers (default: auto, "
+                "which is linear)",
         .row = {.label = "Interpolation",
                 .tip = "The density between the centers of voxels."}})};
 };

@@ -25,6 +25,7 @@ class DynamicFeed : public VolumeFeed {
   [[nodiscard]] VolumeInfoPtr info() const override;
   [[nodiscard]] VolumeAssetPtr volume() const override;
   [[nodiscard]] const void* source() const override { return live_.get(); }
+  [[nodiscard]] const Live& live() const { return *live_; }
   [[nodiscard]] std::shared_ptr<JobSource> jobs() const override { return builder_; }
 
   struct Status {

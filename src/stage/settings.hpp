@@ -28,13 +28,19 @@ static_assert(static_cast<int>(BuildOn::gpu) == CUMULET_BUILD_GPU);
 struct GridSettings {
   BuildSettings build;  // refine.camera is filled in from the viewer's camera
   bool camera_adaptive = false;
+  /// For dynamic volumes whose voxels may stay in GL (Live::values_wanted()), in place of build.interpolation.
+  grid::Interpolation interpolation_in_gl = grid::Interpolation::nearest;
 
   static GridSettings of(const cumulet_grid_desc& d) {
     GridSettings s;
     s.build.march = static_cast<scene::March>(d.type);
     s.build.on = static_cast<BuildOn>(d.build_device);
     s.build.interpolation =
-        d.interpolation == CUMULET_INTERPOLATION_LINEAR ? grid::Interpolation::linear : grid::Interpolation::nearest;
+        d.interpolation == CUMULET_INTERPOLATION_NEAREST ? grid::Interpolation::nearest : grid::Interpolation::linear;
+    // Linear interpolation alone would bring them to main memory.
+    const bool may_stay_in_gl = s.build.march == scene::March::tet && s.build.on == BuildOn::gpu;
+    const bool automatic = d.interpolation == CUMULET_INTERPOLATION_AUTO;
+    s.interpolation_in_gl = automatic && may_stay_in_gl ? grid::Interpolation::nearest : s.build.interpolation;
     grid::RefineSettings& refine = s.build.refine;
     refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
     const cumulet_refinement_criterion criterion = settings::criterion_of(d);

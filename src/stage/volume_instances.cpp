@@ -158,7 +158,7 @@ void VolumeStage::take_grids() {
   }
 }
 
-BuildSettings VolumeStage::settings_of(const Shown& shown) const {
+BuildSettings VolumeStage::settings_of(const Shown& shown) {
   const Medium& medium = shown.settings.medium;
   BuildSettings settings = grid_.build;
   settings.density_ramp = shown.settings.ramps.density;
@@ -170,6 +170,7 @@ BuildSettings VolumeStage::settings_of(const Shown& shown) const {
     settings.refine.camera = refine_camera();
     settings.refine.camera->transforms = {shown.settings.to_world};
   }
+  if (shown.settings.live) settings.interpolation = interpolation_of(*shown.settings.live);
   return settings;
 }
 

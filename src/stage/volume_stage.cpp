@@ -119,7 +119,9 @@ void VolumeStage::set_sequence(std::shared_ptr<Sequence> sequence) {
 void VolumeStage::set_live(std::shared_ptr<Live> live) {
   if (!begin_anew(live != nullptr, as_dynamic(feed_) != nullptr)) return;
   host_.track(live);
-  feed_ = std::make_shared<DynamicFeed>(std::move(live), settings_at_once(), borrowed(jobs_.states), feed_context());
+  std::optional<BuildSettings> settings = settings_at_once();
+  if (settings) settings->interpolation = interpolation_of(*live);
+  feed_ = std::make_shared<DynamicFeed>(std::move(live), settings, borrowed(jobs_.states), feed_context());
   host_.touch();
 }
 
@@ -219,6 +221,21 @@ BuildSettings VolumeStage::settings_for_view() const {
   return settings;
 }
 
+grid::Interpolation VolumeStage::interpolation_of(const Live& live) {
+  if (live.values_wanted() == nullptr) return grid_.build.interpolation;
+  if (grid_.interpolation_in_gl != grid_.build.interpolation && !std::exchange(remarked_interpolation_, true))
+    log_.info(
+        "GPU-resident dynamic volumes are built without interpolation between voxels, because linear interpolation "
+        "needs the voxels in main memory");
+  return grid_.interpolation_in_gl;
+}
+
+std::optional<BuildSettings> VolumeStage::for_own_feed(std::optional<BuildSettings> settings) {
+  const DynamicFeed* live = as_dynamic(feed_);
+  if (live != nullptr && settings) settings->interpolation = interpolation_of(live->live());
+  return settings;
+}
+
 bool VolumeStage::built_for_another() const {
   const bool own_is_due = track_.own_left_out && !jobs_.builder.loads();
   return grid_.camera_adaptive && track_.view &&
@@ -237,7 +254,7 @@ void VolumeStage::request_build(bool (*concerned)(const VolumeAsset&)) {
     return;
   }
   track_.built_for.reset();
-  if (feed_) feed_->request(settings_at_once());
+  if (feed_) feed_->request(for_own_feed(settings_at_once()));
 }
 
 void VolumeStage::load_volume(const VolumeFile& file) {
@@ -501,6 +518,14 @@ std::optional<std::uint64_t> VolumeStage::tag_of(std::uint64_t id) const {
   return found != shown_.end() ? std::optional(found->settings.tag) : std::nullopt;
 }
 
+std::optional<grid::Interpolation> VolumeStage::interpolation() const {
+  const auto has_grid = [](const Shown& shown) { return shown.is_seen() && shown.built && shown.built->source; };
+  const auto shown = std::ranges::find_if(shown_, has_grid);
+  // Without a volume the own grid is the empty one for surfaces.
+  const Built& built = (built_.source && volume_info_) || shown == shown_.end() ? built_ : *shown->built;
+  return built.source ? std::optional(built.settings.interpolation) : std::nullopt;
+}
+
 GridTotals VolumeStage::totals() const {
   GridTotals totals;
   const auto add_built = [&](const Built& built) {
@@ -608,7 +633,7 @@ void VolumeStage::request_for_view(bool view_rests, const std::function<bool()>&
   if (own != nullptr) {
     if (!another_comes) own->build(settings_for_view(), rests ? nullptr : built_.source->plan);
   } else if (feed_) {
-    feed_->request(settings_for_view());
+    feed_->request(for_own_feed(settings_for_view()));
     if (as_dynamic(feed_) == nullptr) follow_feed();
   }
   requests_due_ = true;

@@ -99,6 +99,8 @@ class VolumeStage {
   /// Returns the host's tag of an instance; nullopt if it is not shown.
   [[nodiscard]] std::optional<std::uint64_t> tag_of(std::uint64_t id) const;
   [[nodiscard]] GridTotals totals() const;
+  /// Returns that of the viewer's own grid, or else of the first instance that has one; nullopt: there is no grid.
+  [[nodiscard]] std::optional<grid::Interpolation> interpolation() const;
   /// Calls `visit` with the grids of the viewer's own volume and of instances.
   void for_each_grid(const std::function<void(Built&)>& visit);
 
@@ -253,6 +255,10 @@ class VolumeStage {
   // Build settings that do not depend on the view. Nullopt if grids do; the next frame requests them then.
   [[nodiscard]] std::optional<BuildSettings> settings_at_once() const;
   [[nodiscard]] BuildSettings settings_for_view() const;
+  // Returns the interpolation of a dynamic volume. Logs once if other volumes have another.
+  [[nodiscard]] grid::Interpolation interpolation_of(const Live& live);
+  // Returns these settings with the interpolation of the viewer's own feed.
+  [[nodiscard]] std::optional<BuildSettings> for_own_feed(std::optional<BuildSettings> settings);
   [[nodiscard]] grid::RefineCamera refine_camera() const;
   // True if workers that build grids are busy.
   [[nodiscard]] bool builds() const;
@@ -268,7 +274,7 @@ class VolumeStage {
   [[nodiscard]] std::vector<Shown>::iterator look_up(const Instance& instance);
   void follow_instances();
   // If grids depend on the view, there must be a view.
-  [[nodiscard]] BuildSettings settings_of(const Shown& shown) const;
+  [[nodiscard]] BuildSettings settings_of(const Shown& shown);
   void request_for_grids();
   // Changes a request to the settings of an existing or requested grid that can be used for it.
   void reuse_grid(GridCache::Request& request) const;
@@ -294,6 +300,7 @@ class VolumeStage {
   Medium medium_;
   Ramps ramps_;
   bool preview_ = true;
+  bool remarked_interpolation_ = false;  // that of GPU-resident volumes was logged
   double shutter_seconds_ = 0.0;
   VolumeAssetPtr volume_;
   VolumeInfoPtr volume_info_;

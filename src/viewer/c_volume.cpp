@@ -7,6 +7,7 @@
 #include "viewer/c_handles.hpp"
 #include "viewer/c_stream.hpp"
 #include "viewer/c_support.hpp"
+#include "viewer/c_viewer.hpp"
 #include "volume/inspection.hpp"
 #include "volume/memory.hpp"
 
@@ -283,5 +284,15 @@ cumulet_status cumulet_inspection_get_metadata(const cumulet_inspection* inspect
     found.type = entry.type.c_str();
     found.value = entry.value.c_str();
     write_desc(out, found, "cumulet_metadata");
+  });
+}
+
+cumulet_status cumulet_get_interpolation(cumulet_viewer* viewer, cumulet_interpolation* interpolation) {
+  return with_state(viewer, [&](cumulet::viewer::Viewer& v) {
+    require(interpolation != nullptr, "interpolation is NULL");
+    const std::optional<grid::Interpolation> used = v.interpolation();
+    *interpolation = CUMULET_INTERPOLATION_AUTO;
+    if (used == grid::Interpolation::nearest) *interpolation = CUMULET_INTERPOLATION_NEAREST;
+    if (used == grid::Interpolation::linear) *interpolation = CUMULET_INTERPOLATION_LINEAR;
   });
 }

@@ -83,6 +83,11 @@ VolumeInfoPtr Viewer::volume_info() {
   return stage_.volumes.volume_info();
 }
 
+std::optional<grid::Interpolation> Viewer::interpolation() {
+  sync();
+  return stage_.volumes.interpolation();
+}
+
 // ---- jobs ----
 
 void Viewer::set_limits(const Limits& limits) {

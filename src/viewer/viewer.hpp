@@ -78,6 +78,8 @@ class Viewer final : private StageHost {
   VolumeAssetPtr volume();
   /// Returns the metadata of the volume or the sequence; null if there is none.
   VolumeInfoPtr volume_info();
+  /// As VolumeStage::interpolation().
+  std::optional<grid::Interpolation> interpolation();
   /// Shows the current frame of a sequence instead of the volume. Null: removes the sequence that is shown, if any.
   void set_sequence(std::shared_ptr<Sequence> sequence) { stage_.volumes.set_sequence(std::move(sequence)); }
   using SequenceStatus = SequenceFeed::Status;

@@ -20,7 +20,7 @@ inline cumulet_sun_sky_desc daylight() {
   return light;
 }
 
-/// A viewer in daylight with the library's defaults.
+/// A viewer in daylight with the library's defaults, except that voxels are cubes as in older results.
 inline test::ViewerPtr make_viewer(headless::Context& context) {
   auto create = test::make_desc<cumulet_create_desc>();
   create.get_proc = headless::Context::get_proc;
@@ -28,6 +28,9 @@ inline test::ViewerPtr make_viewer(headless::Context& context) {
   test::ViewerPtr viewer = test::make_plain_viewer(create);
   const cumulet_sun_sky_desc light = daylight();
   must(viewer.get(), cumulet_set_sun_sky(viewer.get(), &light));
+  auto grid = test::make_desc<cumulet_grid_desc>();
+  grid.interpolation = CUMULET_INTERPOLATION_NEAREST;
+  must(viewer.get(), cumulet_set_grid(viewer.get(), &grid));
   return viewer;
 }
 

@@ -97,7 +97,7 @@ def render_ours(options, description):
     for seed in (1, 2):
         file, stats = options.out / f"ours{seed}.pfm", options.out / "stats.json"
         run([options.render, "--scene", scene, "--size", options.size, "--spp", options.spp, "--seed", seed, "-o", file, "--stats", stats,
-             *(["--threshold", options.threshold] if options.threshold else [])])
+             "--interpolation", options.interpolation, *(["--threshold", options.threshold] if options.threshold else [])])
         said = json.loads(stats.read_text())
         seconds += said["trace_seconds"] + said["build_seconds"]["total"]
         cells = said["cells"]
@@ -138,6 +138,8 @@ def main():
     parser.add_argument("--peer-spp", type=int, default=64)
     parser.add_argument("--step", type=float, default=0.5, help="Cycles' volume step rate: it marches by steps of so many voxels")
     parser.add_argument("--threshold", type=float, help="of our grids")
+    parser.add_argument("--interpolation", choices=("nearest", "linear"), default="nearest",
+                        help="of our grids (default: nearest, as in older results; Cycles interpolates linearly)")
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument("--moving", action="store_true", help="there is motion")
     motion.add_argument("--flow", action="store_true", help="one volume, which moves by its velocity")

@@ -266,7 +266,10 @@ Stage::Stage(headless::Context& context, const JudgedScene& scene, std::uint32_t
     : size_(size),
       gl_(test::load_gl(headless::Context::get_proc, &context)),
       target_(gl_, static_cast<int>(size), static_cast<int>(size)),
-      viewer_(test::make_viewer({.get_proc = headless::Context::get_proc, .user = &context, .programs = programs})) {
+      viewer_(test::make_viewer({.get_proc = headless::Context::get_proc,
+                                 .user = &context,
+                                 .programs = programs,
+                                 .interpolation = CUMULET_INTERPOLATION_NEAREST})) {  // as in older results
   const Looks looks = recipe_of(scene.name).looks();
   light_ = looks.light;
   display_ = looks.display;

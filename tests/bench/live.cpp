@@ -149,6 +149,7 @@ class Bench {
     must(viewer_.get(), cumulet_set_sampling(viewer_.get(), &sampling));
     auto grid = make_desc<cumulet_grid_desc>();
     grid.build_device = build;
+    grid.interpolation = CUMULET_INTERPOLATION_NEAREST;  // as in older results
     must(viewer_.get(), cumulet_set_grid(viewer_.get(), &grid));
     auto desc = make_desc<cumulet_dynamic_volume_desc>();
     desc.gpu_resident = gpu_resident ? 1 : 0;

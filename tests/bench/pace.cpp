@@ -61,7 +61,10 @@ class Bench {
   }
 
   cumulet::test::ViewerPtr open(std::uint32_t samples, cumulet_preview preview) {
-    auto viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = samples});
+    auto viewer = cumulet::test::make_viewer({.get_proc = Context::get_proc,
+                                              .user = &context_,
+                                              .samples = samples,
+                                              .interpolation = CUMULET_INTERPOLATION_NEAREST});  // as in older results
     auto sampling = cumulet::test::make_desc<cumulet_sampling_desc>();
     sampling.samples = samples;
     sampling.preview = preview;

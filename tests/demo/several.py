@@ -39,8 +39,12 @@ def mean(pfm):
     return sum(values) / len(values)
 
 
+def stats(name):
+    return json.loads((folder / f"{name}.stats").read_text())
+
+
 def cells(name):
-    return json.loads((folder / f"{name}.stats").read_text())["cells"]
+    return stats(name)["cells"]
 
 
 def near(a, b, part):
@@ -73,6 +77,14 @@ places = {"places": [{"translate": [-25, 0, 0]}, {"translate": [25, 0, 0]}]}
 first = render("first_places", [volume(cloud, 0.8, **places)])
 second = render("second_places", [volume(fire, 1, **hidden), volume(cloud, 0.8, **places)])
 assert near(mean(second), mean(first), 0.01), (mean(second), mean(first))
+
+# All of them are interpolated linearly unless the scene or a flag says otherwise.
+assert {stats(name)["interpolation"] for name in ("whole", "two", "second_places")} == {"linear"}
+assert render("linear", [volume(cloud, 0.8)], grid={"interpolation": "linear"}) == whole
+nearest = render("nearest", [volume(cloud, 0.8)], grid={"interpolation": "nearest"})
+assert nearest != whole and stats("nearest")["interpolation"] == "nearest"
+assert render("auto", [volume(cloud, 0.8)], "--interpolation", "auto", grid={"interpolation": "nearest"}) == whole
+assert render("flag", [volume(cloud, 0.8)], "--interpolation", "nearest") == nearest
 
 # The camera is one of the scene's cameras, by name.
 cameras = [{"name": "front", "eye": [0, 20, 130], "target": [0, 15, 0]},

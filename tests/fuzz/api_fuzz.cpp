@@ -461,8 +461,11 @@ class Program : Arguments {
         return get<cumulet_stats>(cumulet_get_stats);
       case 1:
         return look_at_progress();
-      case 2:
+      case 2: {
+        cumulet_interpolation interpolation{};
+        check(cumulet_get_interpolation(viewer_.get(), &interpolation));
         return check(cumulet_get_bounds(viewer_.get(), low, high));
+      }
       case 3: {
         std::array<cumulet_volume_info, 2> info{};
         info[0] = described<cumulet_volume_info>();

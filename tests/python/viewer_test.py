@@ -112,6 +112,7 @@ class Pictures(unittest.TestCase):
         self.assertIs(pick.hit_volume, True)
         self.assertEqual(self.viewer.get_bounds()[1], (7.5, 7.5, 7.5))
         self.assertGreater(self.viewer.get_stats().cells, 0)
+        self.assertEqual(self.viewer.get_interpolation(), cumulet.Interpolation.LINEAR, "the default")
 
     def test_the_same_picture_again(self):
         again = self.viewer.render_picture(SIZE, progress=False)

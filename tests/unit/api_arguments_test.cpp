@@ -68,6 +68,7 @@ TEST_F(ApiArguments, ReadingIntoNullIsAnError) {
   expect_refused("encode", cumulet_encode_display(v_, nullptr, bytes.data(), 4), "linear or rgba is NULL");
   std::array<double, 3> box{};
   expect_refused("bounds", cumulet_get_bounds(v_, box.data(), nullptr), "box_min or box_max is NULL");
+  expect_refused("interpolation", cumulet_get_interpolation(v_, nullptr), "interpolation is NULL");
   // A buffer that is too small has a different error.
   std::vector<float> few(4);
   expect_refused("few", cumulet_read_linear(v_, few.data(), few.size()), "the image needs 1024 floats");

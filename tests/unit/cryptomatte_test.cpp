@@ -129,6 +129,7 @@ class Cryptomatte : public CViewerTest {
     grid.cells = CUMULET_CELLS_CONSTANT;
     grid.criterion = CUMULET_CRITERION_DEVIATION;
     grid.threshold = 1e-6F;
+    grid.interpolation = CUMULET_INTERPOLATION_NEAREST;
     ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
   }
 

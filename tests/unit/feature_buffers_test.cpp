@@ -68,6 +68,7 @@ TEST_P(FeatureBuffers, RaysThroughThousandsOfVoxelsAreComplete) {
     auto grid = make_desc<cumulet_grid_desc>();
     grid.type = march;
     grid.threshold = 1e-6F;
+    grid.interpolation = CUMULET_INTERPOLATION_NEAREST;
     ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
     make();
     for (const float transmittance : aov(CUMULET_AOV_TRANSMITTANCE, 1))

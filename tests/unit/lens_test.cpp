@@ -156,6 +156,7 @@ TEST_F(Lens, BlursVolumesForEveryGridType) {
     SCOPED_TRACE(march);
     auto grid = make_desc<cumulet_grid_desc>();
     grid.type = march;
+    grid.interpolation = CUMULET_INTERPOLATION_NEAREST;
     ASSERT_EQ(cumulet_set_grid(viewer_.get(), &grid), CUMULET_OK);
     desc_.lens_radius = 0.0;
     const Spot sharp = spot(picture(), 3, 10.0);

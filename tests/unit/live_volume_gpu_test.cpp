@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -145,6 +148,7 @@ TEST_F(LiveStatesOnGpu, IsReadBackWhenNeededInMemory) {
        [&] {
          auto grid = make_desc<cumulet_grid_desc>();
          grid.build_device = CUMULET_BUILD_CPU;
+         grid.interpolation = CUMULET_INTERPOLATION_NEAREST;
          EXPECT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
        }},
   };
@@ -165,6 +169,81 @@ TEST_F(LiveStatesOnGpu, IsReadBackWhenNeededInMemory) {
     EXPECT_EQ(arrive(), 1U);
     expect_same_fields(newest(live_), alone(dense(odd, next.values)));
   }
+}
+
+cumulet_interpolation interpolation_in_use(cumulet_viewer* viewer) {
+  cumulet_interpolation found{};
+  EXPECT_EQ(cumulet_get_interpolation(viewer, &found), CUMULET_OK) << cumulet_last_error(viewer);
+  return found;
+}
+
+void count_notes(void* user, cumulet_log_level level, const char* line) {
+  if (level == CUMULET_LOG_INFO && std::string_view(line).find("interpolation") != std::string_view::npos)
+    ++*static_cast<std::atomic<int>*>(user);
+}
+
+// The default is linear interpolation, except where it alone would bring voxels to main memory.
+TEST_F(LiveStatesOnGpu, DefaultInterpolationLeavesVoxelsOnTheGpu) {
+  static std::atomic<int> notes;
+  notes = 0;
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  viewer_ = test::make_viewer({.get_proc = test::FakeGl::get_proc,
+                               .user = &fake_,
+                               .log = count_notes,
+                               .log_user = &notes,
+                               .samples = 2,
+                               .build = CUMULET_BUILD_GPU});
+  v_ = viewer_.get();
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_AUTO) << "there is no grid";
+  EXPECT_EQ(notes, 0);
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
+  hand_over_density(array, voxel_types[1]);
+  EXPECT_EQ(arrive(), 1U);
+  EXPECT_EQ(difference(picture(), reference(array.values)), "");
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_NEAREST);
+  EXPECT_FALSE(shows_voxels());
+  // Other volumes in the same viewer are interpolated.
+  test::picture_of(v_, alone(dense(odd, array.values)).get(), target_);
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_LINEAR);
+  // So is this one in grids that need its voxels in main memory.
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, live_.get()), CUMULET_OK);
+  auto bricks = make_desc<cumulet_grid_desc>();
+  bricks.build_device = CUMULET_BUILD_GPU;
+  bricks.type = CUMULET_GRID_BRICKS;
+  ASSERT_EQ(cumulet_set_grid(v_, &bricks), CUMULET_OK);
+  EXPECT_EQ(arrive(), 1U);
+  const ViewerPtr other = make();
+  ASSERT_EQ(cumulet_set_grid(other.get(), &bricks), CUMULET_OK);
+  EXPECT_EQ(difference(picture(), test::picture_of(other.get(), alone(dense(odd, array.values)).get(), target_)), "");
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_LINEAR);
+  EXPECT_TRUE(shows_voxels());
+  // The settings decide, not where the voxels are now.
+  interpolate(v_, CUMULET_INTERPOLATION_AUTO);
+  EXPECT_EQ(difference(picture(), reference(array.values)), "");
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_NEAREST);
+  EXPECT_EQ(notes, 1);
+}
+
+TEST_F(LiveStatesOnGpu, DefaultInterpolationOfAnInstanceLeavesVoxelsOnTheGpu) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  ASSERT_EQ(cumulet_set_dynamic_volume(v_, nullptr), CUMULET_OK);
+  interpolate(v_, CUMULET_INTERPOLATION_AUTO);
+  auto desc = make_desc<cumulet_instance_desc>();
+  desc.dynamic_volume = live_.get();
+  const test::InstanceRef instance = test::make_instance(desc);
+  ASSERT_EQ(cumulet_add_instance(v_, instance.get()), CUMULET_OK);
+  hand_over_density(array, voxel_types[1]);
+  auto info = make_desc<cumulet_dynamic_volume_info>();
+  render_until([&] {
+    cumulet_get_instance_dynamic_volume_info(v_, instance.get(), &info);
+    return info.ready_update == 1;
+  });
+  ASSERT_EQ(info.ready_update, 1U);
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_NEAREST);
+  const test::VolumeRef own = alone(dense(odd, array.values));
+  test::picture_of(v_, own.get(), target_);
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_LINEAR) << "of the viewer's own volume";
+  EXPECT_NE(get_volume(CUMULET_ERROR_UNSUPPORTED).find("on the GPU"), std::string::npos) << "the instance's is there";
 }
 
 // Rejected states leave the current one.

@@ -127,6 +127,9 @@ class MotionVectors : public CViewerTest {
   void SetUp() override {
     CViewerTest::SetUp();
     if (IsSkipped()) return;
+    auto grid = make_desc<cumulet_grid_desc>();
+    grid.interpolation = CUMULET_INTERPOLATION_NEAREST;  // a plate of cubes is thinner
+    ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
     now();
   }
 

@@ -19,6 +19,7 @@
 
 #include "options.hpp"
 #include "settings/aov_table.hpp"
+#include "stage/settings.hpp"
 #include "viewer/c_fields.hpp"
 #include "viewer/c_settings.hpp"
 
@@ -143,14 +144,39 @@ TEST(Settings, TheTableHasEveryFieldOfTheHeaderUnderItsName) {
   expect_all_fields<cumulet_navigation_desc>();
 }
 
-TEST(Settings, ZeroSelectsTheDefaultOfAnEnum) {
-  cumulet_grid_desc grid{};
-  grid.struct_size = sizeof grid;
-  EXPECT_EQ(c_abi::read_settings(&grid).interpolation, CUMULET_INTERPOLATION_NEAREST);
-  grid.interpolation = CUMULET_INTERPOLATION_LINEAR;
-  EXPECT_EQ(c_abi::read_settings(&grid).interpolation, CUMULET_INTERPOLATION_LINEAR);
+TEST(Settings, InterpolationIsLinearByDefaultWhereVoxelsAreInMainMemory) {
+  using grid::Interpolation;
+  struct Case {
+    cumulet_interpolation asked;
+    Interpolation in_memory, in_gl;
+  };
+  for (const bool can_stay : {false, true}) {
+    SCOPED_TRACE(can_stay);
+    for (const Case& one : {Case{CUMULET_INTERPOLATION_AUTO, Interpolation::linear,
+                                 can_stay ? Interpolation::nearest : Interpolation::linear},
+                            Case{CUMULET_INTERPOLATION_NEAREST, Interpolation::nearest, Interpolation::nearest},
+                            Case{CUMULET_INTERPOLATION_LINEAR, Interpolation::linear, Interpolation::linear}}) {
+      cumulet_grid_desc grid{};
+      grid.struct_size = sizeof grid;
+      grid.interpolation = one.asked;
+      const auto expect = [&](cumulet_grid_type type, cumulet_build_device device) {
+        grid.type = type;
+        grid.build_device = device;
+        const auto found = viewer::GridSettings::of(c_abi::read_settings(&grid));
+        EXPECT_EQ(found.build.interpolation, one.in_memory) << one.asked;
+        EXPECT_EQ(found.interpolation_in_gl, one.in_gl) << one.asked;
+      };
+      if (can_stay) {
+        expect(CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_GPU);
+        continue;
+      }
+      expect(CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_CPU);
+      expect(CUMULET_GRID_DENSE, CUMULET_BUILD_GPU);
+      expect(CUMULET_GRID_BRICKS, CUMULET_BUILD_CPU);
+    }
+  }
   // A scene leaves it to the library.
-  EXPECT_EQ(demo::scene_text(SceneOptions(), "/s.json").find("nearest"), std::string::npos);
+  EXPECT_NE(demo::scene_text(SceneOptions(), "/s.json").find(R"("interpolation": "auto")"), std::string::npos);
 }
 
 TEST(Settings, SceneFilesRoundTripEachSetting) {

@@ -2223,7 +2223,12 @@ typedef enum cumulet_cell_density {
 
 /** The field that voxels stand for. All fields of a volume are interpolated alike. */
 typedef enum cumulet_interpolation {
-  CUMULET_INTERPOLATION_AUTO = 0,    /**< The library's default: nearest. A release may choose linear. */
+  /**
+   * The library's default: linear. There is one exception: nearest for dynamic volumes with
+   * cumulet_dynamic_volume_desc.gpu_resident, if the grid is tetrahedral and the GPU builds it, because linear would
+   * need their voxels in main memory. Then the log says so once. cumulet_get_interpolation returns which is in use.
+   */
+  CUMULET_INTERPOLATION_AUTO = 0,
   CUMULET_INTERPOLATION_NEAREST = 1, /**< A voxel is a cube of constant value. */
   /**
    * A voxel is a sample at its center, with trilinear interpolation between centers. The field ends half a voxel
@@ -2284,7 +2289,7 @@ typedef struct cumulet_grid_desc {
   int32_t camera_adaptive;
   double pixel_size;                 /**< Pixels that a cell's longest edge must cover to be split, up to 1e6. 0: 1. */
   cumulet_build_device build_device; /**< The device that builds CUMULET_GRID_TETRAHEDRAL. */
-  cumulet_interpolation interpolation; /**< Interpolation between voxels, for all grid types. */
+  cumulet_interpolation interpolation; /**< Interpolation between voxels, for all grid types. 0: linear. */
 } cumulet_grid_desc;
 
 /** The phase function: the distribution of scattered directions. */
@@ -4248,6 +4253,19 @@ typedef struct cumulet_stats {
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
  */
 CUMULET_API cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats);
+
+/**
+ * Returns the interpolation between voxels that is in use, which cumulet_grid_desc.interpolation may leave to the
+ * library.
+ *
+ * Threads: any thread. No GL.
+ *
+ * @param viewer        The viewer.
+ * @param interpolation Receives that of the newest grid of the viewer's volume, sequence or dynamic volume; without
+ *                      one, of the first instance that has a grid. CUMULET_INTERPOLATION_AUTO: there is no grid.
+ * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
+ */
+CUMULET_API cumulet_status cumulet_get_interpolation(cumulet_viewer* viewer, cumulet_interpolation* interpolation);
 
 /** @} */
 

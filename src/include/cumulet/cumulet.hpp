@@ -1617,6 +1617,11 @@ class Viewer {
     if (auto done = result(cumulet_pick_at(handle(), x, y, &c)); !done) return done.error();
     return Pick::of(c);
   }
+  [[nodiscard]] Result<Interpolation> get_interpolation() noexcept {
+    auto used = CUMULET_INTERPOLATION_AUTO;
+    if (auto done = result(cumulet_get_interpolation(handle(), &used)); !done) return done.error();
+    return static_cast<Interpolation>(used);
+  }
   [[nodiscard]] Result<Bounds> get_bounds() noexcept {
     Bounds bounds;
     if (auto done = result(cumulet_get_bounds(handle(), bounds.min.data(), bounds.max.data())); !done) {

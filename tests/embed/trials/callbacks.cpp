@@ -80,7 +80,9 @@ void Caller::call_others() {
   const auto read = make_desc<cumulet_read_desc>();
   auto read_info = make_desc<cumulet_read_info>();
   std::uint64_t number = 0;
+  cumulet_interpolation interpolation{};
   for (cumulet_viewer* v : {viewer, other}) {
+    CALL(cumulet_get_interpolation, v, &interpolation);
     CALL(cumulet_set_display_lut, v, nullptr);
     CALL(cumulet_begin_read, v, &read, &number);
     CALL(cumulet_finish_read, v, 1, nullptr, 0, &read_info);

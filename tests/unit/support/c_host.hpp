@@ -273,6 +273,7 @@ struct ViewerOptions {
   std::uint32_t samples = 4;
   cumulet_shader_cache* programs = nullptr;
   cumulet_build_device build = CUMULET_BUILD_CPU;
+  cumulet_interpolation interpolation = CUMULET_INTERPOLATION_AUTO;
 };
 
 /// A viewer with the default settings of the library.
@@ -323,6 +324,7 @@ inline ViewerPtr make_viewer(const ViewerOptions& options) {
   stand.eye[2] = 32.0;
   auto grid = make_desc<cumulet_grid_desc>();
   grid.build_device = options.build;
+  grid.interpolation = options.interpolation;
   if (cumulet_set_sun_sky(out, &light) != CUMULET_OK || cumulet_set_sampling(out, &sampling) != CUMULET_OK ||
       cumulet_set_grid(out, &grid) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(out));

@@ -160,8 +160,14 @@ class LiveStatesFromGl : public testing::Test {
  protected:
   using Picture = std::vector<std::uint8_t>;
 
+  // Grids that are built on the GPU are not interpolated, so that volumes in main memory look like GPU-resident ones.
   ViewerPtr make(cumulet_build_device build = CUMULET_BUILD_CPU) {
-    return make_viewer({.get_proc = FakeGl::get_proc, .user = &fake_, .samples = 2, .build = build});
+    const bool on_gpu = build == CUMULET_BUILD_GPU;
+    return make_viewer({.get_proc = FakeGl::get_proc,
+                        .user = &fake_,
+                        .samples = 2,
+                        .build = build,
+                        .interpolation = on_gpu ? CUMULET_INTERPOLATION_NEAREST : CUMULET_INTERPOLATION_AUTO});
   }
   void hand_over(const std::vector<cumulet_gl_field>& fields) {
     const cumulet_gl_volume_desc desc = state_of(fields);
