@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <first_view.hpp>
 #include <program.hpp>
 #include <settings.hpp>
 #include <span>
@@ -347,6 +348,11 @@ void Session::see_camera() {
   cumulet_camera_desc now{};
   now.struct_size = sizeof now;
   if (cumulet_camera_get(camera_.get(), &now) != CUMULET_OK || same(now, seen_)) return;
+  // The library has placed the camera.
+  if (needs_fit(seen_) && scene_.surface_camera < 0) {
+    turn_to_first_view(viewer_.get());
+    static_cast<void>(cumulet_camera_get(camera_.get(), &now));
+  }
   events_.camera_moved = true;
   seen_ = now;
   if (now.fovy_degrees == 0.0) now.fovy_degrees = scene_.camera.fovy_degrees;
