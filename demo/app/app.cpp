@@ -6,7 +6,10 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <cstdio>
 #include <file.hpp>
 #include <filesystem>
 #include <image.hpp>
@@ -47,6 +50,8 @@ App::App(DemoOptions options)
   spell_out_defaults(model_.scene);
   model_.preferences = load_preferences(preferences_path_);
   model_.navigation.style = model_.preferences.style;
+  derived_.exposure_given = options_.exposure_given;
+  meter_after_load();
   changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds);
   if (!options_.replay.empty())
     replay_.player.emplace(parse_replay(image::read_file(options_.replay), options_.replay), options_.replay);
@@ -62,6 +67,7 @@ App::App(DemoOptions options)
           [](void* user, const char* name) { return reinterpret_cast<GLADapiproc>(Window::get_proc(user, name)); },
           nullptr) == 0)
     throw std::runtime_error("the OpenGL functions cannot be loaded");
+  make_sample_cards();
   image_.emplace(model_, exchange_, window_->input());
   context_ = window_->make_shared_context();
   renderer_ = std::make_unique<Renderer>(*gl_, context_.get(), Window::wake,
@@ -105,6 +111,7 @@ double App::patience() const {
   if (now_ - last_event_ < event_emissive) return std::min(wait, emissive_frame);
   constexpr double blink = 0.4;
   constexpr double slow_frame = 0.1;
+  if (samples_.files.writes()) wait = std::min(wait, slow_frame);
   if (ImGui::GetIO().WantTextInput) wait = std::min(wait, blink);
   for (const Message& message : model_.messages)
     if (!message.error) wait = std::min(wait, std::max(message.until - now_, slow_frame));
@@ -154,6 +161,7 @@ void App::frame() {
   frames_.state = panel_.state();
   take_thumbnail();
   follow_renders();
+  follow_samples();
   model_.seconds_left = measurements_.seconds_left();
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
@@ -238,9 +246,9 @@ void App::handle_key(const Event& event) {
 bool App::is_unsaid() const {
   cumulet_medium_desc medium = model_.scene.medium;
   if (demo::is_unsaid(medium)) return true;
-  if (!look_) return false;
-  medium.density_scale = look_->density_scale;
-  return settings::same(medium, *look_);
+  if (!derived_.look) return false;
+  medium.density_scale = derived_.look->density_scale;
+  return settings::same(medium, *derived_.look);
 }
 
 void App::complain(const std::string& cause) {
@@ -265,7 +273,9 @@ void App::ask() {
   const bool load = std::exchange(loading_.reload, false) || volume_of(desired.scene) != volume_of(sent.scene);
   desired.edits.volume = sent.edits.volume + (load ? 1 : 0);
   desired.fit = load ? std::exchange(loading_.fit, false) : sent.fit;
-  desired.suggest = load ? std::exchange(loading_.suggest, false) : sent.suggest;
+  // A volume that has become the first one may have no scale yet.
+  const bool no_scale = desired.scene.auto_density_scale && desired.scene.medium.density_scale == 0.0;
+  desired.suggest = load ? std::exchange(loading_.suggest, false) || no_scale : sent.suggest;
   desired.unsaid = load ? is_unsaid() : sent.unsaid;
   desired.edits.surfaces = sent.edits.surfaces + (desired.scene.surfaces == sent.scene.surfaces ? 0 : 1);
   desired.edits.environment = sent.edits.environment + (desired.scene.environment == sent.scene.environment ? 0 : 1);
@@ -341,20 +351,43 @@ void App::accept(const Answer& answer) {
     if (shown > 1 && !clear) panel_.picker().open(model_.scene.volume, Window::wake);
   }
   if (!exchange_.waiting()) loading_.starting = false;
+  if (answer.metered) take_exposure(*answer.metered);
+  if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }
 
 void App::take_look(const cumulet_medium_desc& look) {
   // Another grid of a fire keeps the light that the user chose for the first one.
-  const bool burned = look_ && !demo::is_unsaid(*look_);
-  look_ = look;
+  const bool burned = derived_.look && !demo::is_unsaid(*derived_.look);
+  derived_.look = look;
   model_.scene.medium = look;
   const bool burns = !demo::is_unsaid(look);
-  if (!burns) give_day(model_.scene);
+  if (!burns) give_day(model_.scene, derived_.exposure);
   // A view of OpenColorIO replaces the tone map.
-  if (burns && !burned && options_.viewer.ocio.config.empty() && take_dusk(model_.scene))
+  if (burns && !burned && options_.viewer.ocio.config.empty() && take_dusk(model_.scene, derived_.exposure))
     show_message(
         model_, false, "The volume burns: dusk light and the filmic tone map", now_,
         MessageButton{"Daylight", "Sets the default daylight and tone map. Ctrl+Z undoes that.", {Action::daylight}});
+}
+
+void App::take_exposure(const Metered& metered) {
+  constexpr float tolerance = 0.5f;  // stops
+  const bool asked = std::exchange(derived_.exposure_asked, false);
+  float& stops = model_.scene.display.exposure_stops;
+  if (!metered.stops) {
+    if (asked) show_message(model_, false, "The image is black: no exposure suits it", now_);
+    return;
+  }
+  if (!asked) {
+    const bool chosen = derived_.exposure_given || !is_default_exposure(model_.scene, derived_.exposure);
+    if (chosen || std::abs(*metered.stops - stops) < tolerance) return;
+    // A file that is only viewed needs no saving.
+    if (!model_.modified) changes_->reset();
+  }
+  stops = *metered.stops;
+  derived_.exposure = stops;
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "Auto exposure: %+.1f stops", static_cast<double>(stops));
+  show_message(model_, false, text.data(), now_);
 }
 
 void App::remember_files(const Answer& answer) {
@@ -417,12 +450,22 @@ bool App::draw() {
 }
 
 void App::take_thumbnail() {
-  if (model_.status.thumbnail == thumbnail_) return;
-  thumbnail_ = model_.status.thumbnail;
+  if (model_.status.thumbnail == thumbnail_.thumbnail) return;
+  thumbnail_.thumbnail = model_.status.thumbnail;
   // The new texture is created before the old one is deleted: its name then differs, by which the window detects the
   // change.
-  thumbnail_texture_ = thumbnail_ ? std::make_unique<ThumbnailTexture>(*gl_, *thumbnail_) : nullptr;
-  model_.thumbnail_texture = thumbnail_ ? thumbnail_texture_->name() : 0;
+  const ThumbnailPtr& shown = thumbnail_.thumbnail;
+  thumbnail_.texture = shown ? std::make_unique<ThumbnailTexture>(*gl_, *shown) : nullptr;
+  model_.thumbnail_texture = shown ? thumbnail_.texture->name() : 0;
+}
+
+void App::make_sample_cards() {
+  if (!samples_.files.exist()) return;
+  for (const Sample& sample : samples()) {
+    const Thumbnail picture{image::decode_png(sample.picture, sample.scene).rgba};
+    samples_.textures.push_back(std::make_unique<ThumbnailTexture>(*gl_, picture));
+    model_.samples.push_back({sample.label, sample.tip, sample.scene, samples_.textures.back()->name()});
+  }
 }
 
 void App::obey(const Player::Order& order) {

@@ -18,6 +18,7 @@
 #include "picture_renderer.hpp"
 #include "preferences.hpp"
 #include "replay.hpp"
+#include "samples.hpp"
 #include "sequence_clock.hpp"
 #include "unsaved_changes.hpp"
 #include "window.hpp"
@@ -58,6 +59,10 @@ class App {
   /// Opens the file dialog for a new file with this extension.
   void save_dialog(const char* title, Action action, const char* ending);
   void open(const std::string& path);
+  /// Opens a sample scene when its files are written.
+  void open_sample(const std::string& scene);
+  void follow_samples();
+  void make_sample_cards();
   void open_dropped(const std::vector<std::string>& files);
   /// Says that a volume stands on its Z axis, with a button for the Y axis. further: the file of a further volume, ""
   /// for the first one.
@@ -99,6 +104,10 @@ class App {
   void take_look(const cumulet_medium_desc& look);
   /// Returns true if the medium was set neither by the user nor by a flag or scene file.
   [[nodiscard]] bool is_unsaid() const;
+  /// Measures the exposure when everything is loaded, unless the user has disabled that.
+  void meter_after_load() { loading_.meter = model_.preferences.auto_exposure; }
+  /// Sets the measured exposure, or keeps one that the user or a scene file has set.
+  void take_exposure(const Metered& metered);
   void complain(const std::string& cause);
   /// Returns true if the window was drawn, and false if it would not have changed.
   bool draw();
@@ -119,6 +128,7 @@ class App {
     bool reload = false;           // reload the volume even if it is unchanged
     bool fit = false;
     bool suggest = false;
+    bool meter = false;       // measure the exposure when everything is loaded
     bool pick = false;        // the volume being loaded was opened without a grid name
     bool starting = true;     // until the files of the command line are loaded or have failed
     std::string scene;        // scene file
@@ -143,8 +153,14 @@ class App {
   std::unique_ptr<Window> window_;
   Window::Context context_;
   std::unique_ptr<GladGLContext> gl_;
-  ThumbnailPtr thumbnail_;  // the uploaded one
-  std::unique_ptr<ThumbnailTexture> thumbnail_texture_;
+  struct UploadedThumbnail {
+    ThumbnailPtr thumbnail;
+    std::unique_ptr<ThumbnailTexture> texture;
+  } thumbnail_;  // of the environment
+  struct Samples {
+    SampleFiles files{sample_program(), sample_folder()};
+    std::vector<std::unique_ptr<ThumbnailTexture>> textures;
+  } samples_;
   Timeline timeline_;  // used with --trace
   std::unique_ptr<Renderer> renderer_;
   PictureRenderer pictures_;
@@ -165,7 +181,13 @@ class App {
   double now_ = 0.0;
   double last_event_ = 0.0;
   double last_motion_ = -1.0;
-  std::optional<cumulet_medium_desc> look_;  // default medium that was set for a volume
+  /// Settings that were derived from the scene. They stay if the user changes them.
+  struct Derived {
+    std::optional<cumulet_medium_desc> look;  // default medium of the volume
+    std::optional<float> exposure;            // stops
+    bool exposure_given = false;              // a flag or a scene file has set the exposure
+    bool exposure_asked = false;              // the user has requested the measurement
+  } derived_;
 };
 
 }  // namespace cumulet::demo

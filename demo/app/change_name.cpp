@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <settings.hpp>
 #include <string>
 #include <type_traits>
@@ -45,6 +46,26 @@ std::string counted(std::size_t before, std::size_t after, const char* kind) {
   return (after > before ? "Add " : "Remove ") + std::string(kind);
 }
 
+/// Returns true if both lists have the same objects in another order.
+template <class Value, class Same>
+bool reordered(const std::vector<Value>& before, const std::vector<Value>& after, Same same) {
+  return !std::ranges::equal(before, after, same) && std::ranges::is_permutation(before, after, same);
+}
+
+bool reordered(const SceneOptions& before, const SceneOptions& after) {
+  const auto volumes = [](const SceneOptions& scene) {
+    std::vector<const SceneVolume*> all = {&scene};
+    for (const SceneVolume& other : scene.others) all.push_back(&other);
+    return all;
+  };
+  const auto same = [](const SceneVolume* a, const SceneVolume* b) {
+    return static_cast<const VolumeFile&>(*a) == *b && a->name == b->name && a->visible == b->visible &&
+           a->transforms == b->transforms;
+  };
+  return reordered(volumes(before), volumes(after), same) || reordered(before.models, after.models, std::equal_to()) ||
+         reordered(before.analytic_lights, after.analytic_lights, settings::same<cumulet_light_desc>);
+}
+
 std::string moved(const SceneOptions& before, const SceneOptions& after) {
   const auto volume = [](const SceneVolume& a, const SceneVolume& b) -> std::string {
     if (a.transforms != b.transforms) return "Move " + b.label();
@@ -66,6 +87,7 @@ std::string moved(const SceneOptions& before, const SceneOptions& after) {
 
 std::string change_name(const SceneOptions& before, const SceneOptions& after) {
   const std::vector<std::string> names = {
+      reordered(before, after) ? "Order" : "",
       opened(before.volume, after.volume, "volume"),
       opened(before.surfaces, after.surfaces, "model"),
       opened(before.environment, after.environment, "environment"),

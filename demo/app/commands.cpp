@@ -14,6 +14,7 @@
 #include "desktop.hpp"
 #include "dropped_files.hpp"
 #include "renderer.hpp"
+#include "selection.hpp"
 
 // The commands of the user interface.
 namespace cumulet::demo {
@@ -53,6 +54,7 @@ struct App::Commands {
          if (has_ending(command.text, ".json") && app.ask_about_changes({command})) return;
          app.open(command.text);
        }},
+      {Action::open_sample, [](App& app, const Command& command) { app.open_sample(command.text); }},
       {Action::add_volume_dialog,
        [](App& app, const Command&) {
          app.open_dialog("Add volume", Action::add_volume, {".vdb", ".nvdb", ".nrrd", ".nhdr", ".vti", ".raw", ".tif", ".tiff"});
@@ -138,6 +140,7 @@ struct App::Commands {
        }},
       {Action::duplicate_selected, [](App& app, const Command&) { duplicate_selected(app.model_); }},
       {Action::remove_selected, [](App& app, const Command&) { remove_selected(app.model_); }},
+      {Action::hide_selected, [](App& app, const Command&) { hide_selected(app.model_); }},
       {Action::add_light, [](App& app, const Command&) { add_light(app.model_); }},
       {Action::toggle_help, [](App& app, const Command&) { app.model_.help = !app.model_.help; }},
       {Action::scale_interface,
@@ -173,6 +176,16 @@ struct App::Commands {
        [](App& app, const Command&) {
          float& stops = app.model_.scene.display.exposure_stops;
          stops = std::max(stops - exposure_step, -max_exposure);
+       }},
+      {Action::auto_exposure,
+       [](App& app, const Command&) {
+         app.derived_.exposure_asked = true;
+         app.request({Request::Type::meter_exposure});
+       }},
+      {Action::toggle_auto_exposure,
+       [](App& app, const Command&) {
+         bool& on = app.model_.preferences.auto_exposure;
+         on = !on;
        }},
       {Action::next_grid_type,
        [](App& app, const Command&) {
@@ -235,7 +248,10 @@ struct App::Commands {
        [](App& app, const Command& command) {
          if (!app.ask_about_changes({command})) app.quit_ = true;
        }},
-      {Action::daylight, [](App& app, const Command&) { give_day(app.model_.scene); }},
+      {Action::daylight,
+       [](App& app, const Command&) {
+         if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_after_load();
+       }},
   });
 
   /// Returns true if each action has a function, at its index.
@@ -298,11 +314,29 @@ void App::open(const std::string& path) {
     model_.scene.sequence.last.reset();
     model_.scene.sequence.frame.reset();
     model_.scene.visible = true;
-    model_.subject.reset();
+    deselect(model_);
     loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
   }
+  meter_after_load();
   // A file that is only viewed needs no saving.
   if (!keeps && file_count(model_.scene) == 1) changes_->reset();
+}
+
+void App::open_sample(const std::string& scene) {
+  try {
+    samples_.files.request(scene);
+    if (samples_.files.writes()) show_message(model_, false, "Writing the sample scenes...", now_);
+  } catch (const std::exception& error) {
+    show_message(model_, true, error.what(), now_);
+  }
+}
+
+void App::follow_samples() {
+  try {
+    if (const auto scene = samples_.files.take()) execute({Action::open, *scene});
+  } catch (const std::exception& error) {
+    show_message(model_, true, error.what(), now_);
+  }
 }
 
 void App::show_up_axis(const std::string& path, const std::string& further) {

@@ -63,6 +63,7 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
   check_ocio_options(options.viewer.ocio);
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
+  options.exposure_given = app.count("--exposure") + app.count("--scene") > 0;
   if (app.count("--scene") > 0) options.scene_file = app.get_option("--scene")->as<std::string>();
   options.sized = app.count("--size") > 0;
   if (!options.open.empty() && (!options.scene.volume.empty() || app.count("--scene") > 0))

@@ -13,6 +13,7 @@ namespace cumulet::demo {
 struct DemoOptions {
   SceneOptions scene;
   bool unchosen_ground = false;  // the scene's ground is the default
+  bool exposure_given = false;   // by --exposure or --scene
   bool sized = false;            // --size was given; else the window has the size of the last run
   std::string scene_file;        // of --scene; empty: none
   std::string open;              // file without a flag: a volume, surfaces, an environment or a scene

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -28,6 +30,33 @@ void draw_centered(const char* text) {
   const float length = ImGui::CalcTextSize(text, nullptr, false, room).x;
   ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(0.0f, 0.5f * (room - length)));
   ImGui::TextUnformatted(text);
+}
+
+void draw_samples(Ui& ui, const Model& model, std::vector<Command>& commands) {
+  if (model.samples.empty()) return;
+  const float gap = ImGui::GetStyle().ItemSpacing.x;
+  const auto count = static_cast<float>(model.samples.size());
+  const float width = (ImGui::GetContentRegionAvail().x - gap * (count - 1.0f)) / count;
+  const float label = ImGui::GetTextLineHeightWithSpacing();
+  for (const SampleCard& sample : model.samples) {
+    if (&sample != model.samples.data()) ImGui::SameLine();
+    const ImVec2 corner = ImGui::GetCursorScreenPos();
+    const ImVec2 end(corner.x + width, corner.y + std::round(0.5f * width));
+    const std::string control = std::string("Start/") + sample.label;
+    if (ImGui::InvisibleButton(("##" + control).c_str(), {width, end.y - corner.y + label}))
+      commands.push_back({Action::open_sample, sample.scene});
+    const bool hovered = ImGui::IsItemHovered();
+    ui.remember(control.c_str(), sample.tip);
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
+    auto* picture = reinterpret_cast<ImTextureID>(std::uintptr_t{sample.texture});
+    const float round = ui.px(4.0f);
+    list.AddImageRounded(picture, corner, end, {0.0f, 0.0f}, {1.0f, 1.0f}, IM_COL32_WHITE, round);
+    if (hovered) list.AddRect(corner, end, ImGui::GetColorU32(ImGuiCol_Text, 0.8f), round, 0, ui.px(1.5f));
+    list.AddText({corner.x + ui.px(2.0f), end.y + ui.px(2.0f)},
+                 ImGui::GetColorU32(hovered ? ImGuiCol_Text : ImGuiCol_TextDisabled), sample.label);
+  }
+  ImGui::Spacing();
 }
 
 void draw_recent(Ui& ui, const Model& model, std::vector<Command>& commands) {
@@ -79,6 +108,8 @@ void draw_empty_window(Ui& ui, const Rectangle& view, const Model& model, std::v
                              "or press Ctrl+O.  F1 shows all keys."};
   for (const char* line : lines) draw_centered(line);
   ImGui::PopTextWrapPos();
+  ImGui::Spacing();
+  draw_samples(ui, model, commands);
   draw_recent(ui, model, commands);
   ImGui::End();
   ImGui::PopStyleVar();

@@ -7,8 +7,9 @@
 
 namespace cumulet::demo {
 
-/// Draws the image area of an empty scene: the program's name, how to open files, and the recent files. view: the area
-/// in window coordinates. The controls are "Start/Open" and "Start/" with the name of a recent file.
+/// Draws the image area of an empty scene: the program's name, how to open files, the sample scenes, and the recent
+/// files. view: the area in window coordinates. The controls are "Start/Open", and "Start/" with the name of a sample
+/// or of a recent file.
 void draw_empty_window(Ui& ui, const Rectangle& view, const Model& model, std::vector<Command>& commands);
 
 /// Returns the kind of a file by its name: "Scene", "Model", "Environment" or "Volume".

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panel.hpp"
+#include "selection.hpp"
 
 namespace cumulet::demo {
 
@@ -25,7 +26,7 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
   }
   switch (std::get<Part>(subject)) {
     case Part::render:
-      return render(model);
+      return render(model, commands);
     case Part::camera:
       return camera(model, commands);
     case Part::sun_sky:
@@ -39,14 +40,14 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
   }
 }
 
-void Panel::render(Model& model) {
+void Panel::render(Model& model, std::vector<Command>& commands) {
   const auto section = [this](const char* label, bool open, const auto& content) {
     if (!ui_.section(label, open)) return;
     ImGui::Spacing();
     content();
     ImGui::Dummy({0.0f, ui_.px(6.0f)});
   };
-  section("Image", true, [&] { display(model); });
+  section("Image", true, [&] { display(model, commands); });
   section("Sampling", true, [&] { sampling(model); });
   section("Advanced", false, [&] {
     advanced_sampling(model);

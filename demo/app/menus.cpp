@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "selection.hpp"
+
 namespace cumulet::demo {
 namespace {
 
 bool has_content(const Model& model) { return model.status.has_content; }
 bool has_volume(const Model& model) { return model.status.has_volume; }
 bool plays(const Model& model) { return model.status.play.has_value(); }
-bool has_selection(const Model& model) { return can_remove(model); }
 
 template <Tool tool>
 bool is_tool(const Model& model) {
@@ -73,9 +74,10 @@ Menu edit_menu() {
        separator,
        {"Duplicate",
         {Action::duplicate_selected},
-        "Duplicates the selected object; both share their data.",
-        [](const Model& model) { return can_duplicate(model); }},
-       {"Delete", {Action::remove_selected}, "Removes the selected object from the scene.", has_selection},
+        "Duplicates the selected objects; copies share the data of their originals.",
+        can_duplicate},
+       {"Delete", {Action::remove_selected}, "Removes the selected objects from the scene.", can_remove},
+       {"Hide", {Action::hide_selected}, "Hides the selected objects, or shows them if all are hidden.", can_hide},
        {"Remove environment",
         {Action::clear_environment},
         "Removes the environment map; it is day again.",
@@ -161,6 +163,12 @@ Menu render_menu() {
            separator,
            {"Brighter", {Action::brighter}, "Exposure up by a third of a stop."},
            {"Darker", {Action::darker}, "Exposure down by a third of a stop."},
+           {"Auto exposure", {Action::auto_exposure}, "Sets the exposure that suits the displayed image.", has_content},
+           {"Auto exposure after loading",
+            {Action::toggle_auto_exposure},
+            "Sets a suitable exposure once after each load, unless you or a scene file have set one.",
+            nullptr,
+            [](const Model& model) { return model.preferences.auto_exposure; }},
            {"Drag region", {Action::draw_region}, "The next drag over the image sets the render region.", has_content},
            {"Clear region", {Action::clear_region}, "Renders the whole image.", has_content},
            {"Next grid type", {Action::next_grid_type}, "Tetrahedral, dense, bricks."},

@@ -77,8 +77,9 @@ const std::vector<Shortcut>& shortcuts() {
       {GLFW_KEY_B, ctrl | modifier_alt, {Action::clear_region}, "Ctrl+Alt+B", "Clear the render region"},
       {GLFW_KEY_LEFT_BRACKET, 0, {Action::darker}, "[  ]", "Exposure down, up by a third of a stop"},
       {GLFW_KEY_RIGHT_BRACKET, 0, {Action::brighter}, "", ""},
-      {GLFW_KEY_D, ctrl, {Action::duplicate_selected}, "Ctrl+D", "Duplicate the selected object"},
-      {GLFW_KEY_DELETE, 0, {Action::remove_selected}, "Delete", "Remove the selected object"},
+      {GLFW_KEY_D, ctrl, {Action::duplicate_selected}, "Ctrl+D", "Duplicate the selected objects"},
+      {GLFW_KEY_DELETE, 0, {Action::remove_selected}, "Delete", "Remove the selected objects"},
+      {GLFW_KEY_H, 0, {Action::hide_selected}, "H", "Hide or show the selected objects"},
       {GLFW_KEY_N, 0, {Action::toggle_panel}, "N", "Show or hide the panel and the tools"},
       {GLFW_KEY_F2,
        0,
@@ -161,72 +162,6 @@ Model::Model() {
   status.stats.struct_size = sizeof status.stats;
 }
 
-Subject subject_of(const Model& model) {
-  const std::vector<Item> items = listed_items(model.scene);
-  if (model.subject) {
-    const Item* item = std::get_if<Item>(&*model.subject);
-    const bool exists = item != nullptr ? std::ranges::find(items, *item) != items.end()
-                                        : *model.subject != Subject(Part::surfaces) || !model.scene.surfaces.empty();
-    if (exists) return *model.subject;
-  }
-  if (!items.empty()) return items.front();
-  return model.scene.surfaces.empty() ? Part::render : Part::surfaces;
-}
-
-void select(Model& model, const Subject& subject) {
-  model.subject = subject;
-  model.chosen.reset();
-  const Item* item = std::get_if<Item>(&subject);
-  if (item != nullptr && transform_of(model.scene, *item)) model.chosen = *item;
-}
-
-bool can_remove(const Model& model) {
-  const Subject subject = subject_of(model);
-  return std::holds_alternative<Item>(subject) || subject == Subject(Part::surfaces);
-}
-
-bool can_duplicate(const Model& model) { return std::holds_alternative<Item>(subject_of(model)); }
-
-void remove_selected(Model& model) {
-  const Subject subject = subject_of(model);
-  if (const Item* item = std::get_if<Item>(&subject)) {
-    remove_item(model.scene, *item);
-    spell_out_defaults(model.scene);
-  } else if (subject == Subject(Part::surfaces)) {
-    model.scene.surfaces.clear();
-  } else {
-    return;
-  }
-  model.chosen.reset();
-  model.subject.reset();
-}
-
-void duplicate_selected(Model& model) {
-  const Subject subject = subject_of(model);
-  if (const Item* item = std::get_if<Item>(&subject)) select(model, duplicate_item(model.scene, *item));
-}
-
-namespace {
-
-constexpr double sun_at_noon = 4.0;  // W/m²
-
-}  // namespace
-
-void add_light(Model& model) {
-  const cumulet_camera_desc& camera = model.scene.camera;
-  const double distance =
-      std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
-  const double above = distance > 0.0 ? 0.5 * distance : 1.0;
-  cumulet_light_desc& light = model.scene.analytic_lights.emplace_back();
-  light.struct_size = sizeof light;
-  std::copy(camera.target, camera.target + 3, light.position);
-  light.position[1] += above;
-  light.direction[1] = -1.0;
-  light.power = static_cast<float>(sun_at_noon * 4.0 * std::numbers::pi * above * above);
-  settings::spell_out_zeros(light);
-  select(model, Item{Item::Kind::analytic_light, model.scene.analytic_lights.size() - 1, 0});
-}
-
 void open_surfaces(Model& model, const std::string& path) {
   model.scene.surfaces = path;
   model.scene.surface = {};
@@ -272,23 +207,33 @@ cumulet_sun_sky_desc dusk() {
   return light;
 }
 
-bool is_display(const SceneOptions& scene, float exposure, cumulet_tone_map tone_map) {
-  return scene.display.exposure_stops == exposure && scene.display.tone_map == tone_map;
+bool is_display(const SceneOptions& scene, float exposure, std::optional<float> measured, cumulet_tone_map tone_map) {
+  const float stops = scene.display.exposure_stops;
+  return (stops == exposure || stops == measured) && scene.display.tone_map == tone_map;
+}
+
+bool is_dusk(const SceneOptions& scene, std::optional<float> measured) {
+  return settings::same(scene.light, dusk()) && is_display(scene, dusk_exposure, measured, CUMULET_TONE_MAP_FILMIC);
 }
 
 }  // namespace
 
-bool take_dusk(SceneOptions& scene) {
+bool is_default_exposure(const SceneOptions& scene, std::optional<float> measured) {
+  const float stops = scene.display.exposure_stops;
+  return stops == 0.0f || stops == measured || is_dusk(scene, measured);
+}
+
+bool take_dusk(SceneOptions& scene, std::optional<float> measured) {
   if (!settings::same(scene.light, daylight()) || !scene.environment.empty()) return false;
-  if (!is_display(scene, 0.0f, CUMULET_TONE_MAP_NEUTRAL)) return false;
+  if (!is_display(scene, 0.0f, measured, CUMULET_TONE_MAP_NEUTRAL)) return false;
   scene.light = dusk();
   scene.display.exposure_stops = dusk_exposure;
   scene.display.tone_map = CUMULET_TONE_MAP_FILMIC;
   return true;
 }
 
-bool give_day(SceneOptions& scene) {
-  if (!settings::same(scene.light, dusk()) || !is_display(scene, dusk_exposure, CUMULET_TONE_MAP_FILMIC)) return false;
+bool give_day(SceneOptions& scene, std::optional<float> measured) {
+  if (!is_dusk(scene, measured)) return false;
   scene.light = daylight();
   scene.display.exposure_stops = 0.0f;
   scene.display.tone_map = CUMULET_TONE_MAP_NEUTRAL;

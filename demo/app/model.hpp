@@ -28,7 +28,8 @@ inline constexpr std::uint32_t default_samples = 256;
 enum class Action {
   new_scene,
   open_dialog,
-  open,  // text: a file of any kind
+  open,         // text: a file of any kind
+  open_sample,  // text: the name of its scene file
   add_volume_dialog,
   add_volume,  // text: the file
   add_model_dialog,
@@ -63,6 +64,7 @@ enum class Action {
   focus_panel,
   duplicate_selected,
   remove_selected,
+  hide_selected,
   add_light,
   toggle_help,
   scale_interface,  // value: percent; 0: as the screen
@@ -72,6 +74,8 @@ enum class Action {
   toggle_axes,  // axes of the handles: world or local
   brighter,
   darker,
+  auto_exposure,         // sets the exposure that suits the displayed image
+  toggle_auto_exposure,  // the same after each load
   next_grid_type,
   view,  // value: a cumulet_view_mode
   grids_dialog,
@@ -229,6 +233,14 @@ struct Charts {
 /// Returns the sum over all passes.
 double device_seconds(const cumulet_stats& stats);
 
+/// A sample scene that can be opened.
+struct SampleCard {
+  const char* label;
+  const char* tip;
+  const char* scene;     // name of its scene file
+  unsigned texture = 0;  // OpenGL name of its picture in the window's context
+};
+
 /// All data that the user interface shows and edits.
 struct Model {
   SceneOptions scene;            // defaults are replaced by their values, except for the camera's position
@@ -241,6 +253,7 @@ struct Model {
   Axes axes = Axes::world;         // axes of the handles
   std::optional<Item> chosen;      // selected object
   std::optional<Subject> subject;  // shown in the inspector; nullopt: the first object
+  std::vector<Item> marked;        // objects that are selected together with the subject, which is one of them
   bool playing = false;
   double clock = 0.0;               // seconds; the surfaces' animation uses it too if a sequence is shown
   std::optional<std::string> undo;  // name of the step that can be undone
@@ -249,6 +262,7 @@ struct Model {
   bool modified = false;            // the scene has unsaved changes
   std::vector<GridInfo> grids;
   Status status;
+  std::vector<SampleCard> samples;
   unsigned thumbnail_texture = 0;  // OpenGL name of status.thumbnail in the window's context; 0: none
   Charts charts;
   std::optional<double> seconds_left;  // until the image has all samples; nullopt if that is unknown
@@ -262,18 +276,6 @@ struct Model {
   Model();
 };
 
-/// Returns the subject of the inspector. Objects that are removed are replaced by the first one.
-[[nodiscard]] Subject subject_of(const Model& model);
-/// Shows a part or object in the inspector. Objects with a position are also selected in the image.
-void select(Model& model, const Subject& subject);
-/// Returns true if the subject of the inspector can be removed or duplicated.
-[[nodiscard]] bool can_remove(const Model& model);
-[[nodiscard]] bool can_duplicate(const Model& model);
-void remove_selected(Model& model);
-void duplicate_selected(Model& model);
-/// Adds a point light above the camera's target, with the irradiance of the noon sun there, and selects it.
-void add_light(Model& model);
-
 /// Opens the surfaces of a file. They replace the previous surfaces and the default ground, because models usually have
 /// their own.
 void open_surfaces(Model& model, const std::string& path);
@@ -282,11 +284,14 @@ void open_surfaces(Model& model, const std::string& path);
 /// environment is removed and there is no other sun or sky.
 void take_daylight(SceneOptions& scene);
 void give_daylight(SceneOptions& scene);
+/// Returns true if neither the user nor a scene file has set the exposure. measured: the exposure that was set by auto
+/// exposure, in stops, also below.
+[[nodiscard]] bool is_default_exposure(const SceneOptions& scene, std::optional<float> measured);
 /// Sets dusk light with the filmic tone map and a matching exposure, in which flames look bright, if the scene has the
 /// default daylight and display. Returns true if it did.
-bool take_dusk(SceneOptions& scene);
-/// Sets the default daylight and display again if the scene has exactly those of take_dusk. Returns true if it did.
-bool give_day(SceneOptions& scene);
+bool take_dusk(SceneOptions& scene, std::optional<float> measured = std::nullopt);
+/// Sets the default daylight and display again if the scene has those of take_dusk. Returns true if it did.
+bool give_day(SceneOptions& scene, std::optional<float> measured = std::nullopt);
 
 /// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear
 /// after a while, those with a button later.

@@ -4,7 +4,12 @@
 #include <imgui_stdlib.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <utility>
+
+#include "selection.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -85,14 +90,22 @@ class Icon {
   float unit_;
 };
 
+constexpr const char* dragged_item = "item";
+
+bool contains(const std::vector<Item>& items, const Item& item) {
+  return std::ranges::find(items, item) != items.end();
+}
+
 }  // namespace
 
 void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Command>& commands) {
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {ui_.px(4.0f), ui_.px(4.0f)});
   ImGui::PushStyleColor(ImGuiCol_Header, IM_COL32(95, 143, 191, 120));
   const std::vector<Item> items = listed_items(model.scene);
+  selected_ = selected_items(model);
+  last_rows_ = std::exchange(rows_, {});
   const bool has_surfaces = !model.scene.surfaces.empty();
-  constexpr std::size_t fixed_rows = 8;  // parts and groups
+  constexpr std::size_t fixed_rows = 9;  // parts, groups and an empty one
   const auto rows = static_cast<float>(fixed_rows + items.size() + (has_surfaces ? 1 : 0));
   const float row_height = ImGui::GetTextLineHeightWithSpacing();
   ImGui::BeginChild("outliner", {0.0f, std::min(rows * row_height, max_height)}, false, ImGuiWindowFlags_NavFlattened);
@@ -113,7 +126,10 @@ void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Comm
   group("Models", "Add model", "Adds another model.", Action::add_model_dialog, commands);
   if (has_surfaces) surfaces(model, commands);
   all(Item::Kind::model);
+  drag_box(model);
   ImGui::EndChild();
+  // The order changes when all rows are drawn.
+  if (const auto drop = std::exchange(drop_, std::nullopt)) static_cast<void>(reorder(model, drop->from, drop->to));
   ImGui::PopStyleColor();
   ImGui::PopStyleVar();
 }
@@ -124,8 +140,10 @@ bool Outliner::row(const std::string& control, const char* tip, const std::strin
   // ImGui extends a selectable by half of the spacing on each side.
   const float gap = room > 0.0f ? ImGui::GetStyle().ItemSpacing.x : 0.0f;
   const float width = ImGui::GetContentRegionAvail().x - room - gap;
-  const bool clicked = ImGui::Selectable(("##" + control).c_str(), subject_of(model) == subject,
-                                         ImGuiSelectableFlags_AllowDoubleClick, {std::max(width, 1.0f), 0.0f});
+  const Item* const object = std::get_if<Item>(&subject);
+  const bool selected = object != nullptr ? contains(selected_, *object) : subject_of(model) == subject;
+  const bool clicked = ImGui::Selectable(("##" + control).c_str(), selected, ImGuiSelectableFlags_AllowDoubleClick,
+                                         {std::max(width, 1.0f), 0.0f});
   ui_.remember(control.c_str(), tip);
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const float height = ImGui::GetTextLineHeight();
@@ -178,23 +196,88 @@ void Outliner::item(Model& model, const Item& item, std::vector<Command>& comman
   const std::string title = title_of(model.scene, item);
   if (renamed_ == item) return name_field(model, item);
   bool* const visible = visibility_of(model.scene, item);
-  const bool clicked = row("Scene/" + title, "Selects the object. Double click: rename. Right click: more.",
-                           row_text(model.scene, item), item, model, visible != nullptr ? ui_.px(eye_width) : 0.0f);
-  if (clicked) {
-    select(model, item);
-    if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left) && name_of_object(model.scene, item) != nullptr) {
-      renamed_ = item;
-      name_ = *name_of_object(model.scene, item);
-    }
-  }
+  const bool clicked =
+      row("Scene/" + title,
+          "Selects the object. Ctrl, Shift: several. Double click: rename. Drag: order. Right click: more.",
+          row_text(model.scene, item), item, model, visible != nullptr ? ui_.px(eye_width) : 0.0f);
+  rows_.push_back({item, ImGui::GetItemRectMin().y, ImGui::GetItemRectMax().y});
+  drag(item);
+  if (clicked) click(model, item);
   if (ImGui::BeginPopupContextItem(title.c_str())) {
-    select(model, item);
+    if (!contains(selected_, item)) select(model, item);
     context_menu(item, commands);
     ImGui::EndPopup();
   }
   if (visible == nullptr) return;
   ImGui::SameLine();
-  eye("Eye/" + title, *visible);
+  if (!eye("Eye/" + title, *visible)) return;
+  *visible = !*visible;
+  if (!contains(selected_, item)) return;
+  for (const Item& other : selected_)
+    if (bool* const one = visibility_of(model.scene, other)) *one = *visible;
+}
+
+void Outliner::click(Model& model, const Item& item) {
+  const ImGuiIO& io = ImGui::GetIO();
+  if (io.KeyCtrl) return toggle_selected(model, item);
+  const Subject subject = subject_of(model);
+  const Item* const anchor = std::get_if<Item>(&subject);
+  if (io.KeyShift && anchor != nullptr) {
+    std::vector<Item> range;
+    bool inside = false;
+    for (const Row& row : last_rows_) {
+      const bool end = row.item == item || row.item == *anchor;
+      if (inside || end) range.push_back(row.item);
+      if (end && item != *anchor) inside = !inside;
+    }
+    // The anchor stays the subject, so that the next Shift+click begins there too.
+    return select_items(model, std::move(range), *anchor);
+  }
+  select(model, item);
+  if (!ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left) || name_of_object(model.scene, item) == nullptr) return;
+  renamed_ = item;
+  name_ = *name_of_object(model.scene, item);
+}
+
+void Outliner::drag(const Item& item) {
+  const ImVec2 low = ImGui::GetItemRectMin();
+  const ImVec2 high = ImGui::GetItemRectMax();
+  if (ImGui::BeginDragDropSource(ImGuiDragDropFlags_SourceNoPreviewTooltip)) {
+    ImGui::SetDragDropPayload(dragged_item, &item, sizeof item);
+    ImGui::EndDragDropSource();
+  }
+  if (!ImGui::BeginDragDropTarget()) return;
+  const ImGuiPayload* const payload = ImGui::AcceptDragDropPayload(
+      dragged_item, ImGuiDragDropFlags_AcceptBeforeDelivery | ImGuiDragDropFlags_AcceptNoDrawDefaultRect);
+  ImGui::EndDragDropTarget();
+  if (payload == nullptr) return;
+  Item from;
+  std::memcpy(&from, payload->Data, sizeof from);
+  if (from.kind != item.kind || from == item) return;
+  const bool down = std::pair(from.index, from.transform_index) < std::pair(item.index, item.transform_index);
+  const float y = down ? high.y : low.y;
+  ImGui::GetWindowDrawList()->AddLine({low.x, y}, {high.x, y}, ImGui::GetColorU32(ImGuiCol_DragDropTarget),
+                                      ui_.px(2.0f));
+  if (payload->IsDelivery()) drop_ = Drop{from, item};
+}
+
+void Outliner::drag_box(Model& model) {
+  const float y = ImGui::GetIO().MousePos.y;
+  const bool empty = ImGui::IsWindowHovered() && !ImGui::IsAnyItemHovered();
+  if (empty && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) box_ = y;
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) box_.reset();
+  if (!box_ || !ImGui::IsMouseDragging(ImGuiMouseButton_Left)) return;
+  const float top = std::min(*box_, y);
+  const float bottom = std::max(*box_, y);
+  const float left = ImGui::GetWindowPos().x;
+  ImGui::GetWindowDrawList()->AddRect({left, top}, {left + ImGui::GetWindowWidth(), bottom},
+                                      ImGui::GetColorU32(ImGuiCol_DragDropTarget), 0.0f, 0, ui_.px(1.0f));
+  std::vector<Item> items;
+  for (const Row& row : rows_)
+    if (row.bottom > top && row.top < bottom) items.push_back(row.item);
+  if (items.empty()) return;
+  const Item first = items.front();
+  select_items(model, std::move(items), first);
 }
 
 void Outliner::context_menu(const Item& item, std::vector<Command>& commands) {
@@ -204,14 +287,15 @@ void Outliner::context_menu(const Item& item, std::vector<Command>& commands) {
   };
   entry("Duplicate", "Ctrl+D", "Duplicates the object; both share their data.", Action::duplicate_selected);
   entry("Delete", "Del", "Removes the object from the scene.", Action::remove_selected);
+  entry("Hide", "H", "Hides the object, or shows it.", Action::hide_selected);
   if (item.kind == Item::Kind::volume)
     entry("Inspect grids", "", "Shows the grids of the first volume.", Action::grids_dialog);
 }
 
-void Outliner::eye(const std::string& control, bool& visible) {
+bool Outliner::eye(const std::string& control, bool visible) {
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   const ImVec2 size(ui_.px(eye_width), ImGui::GetTextLineHeight());
-  if (ImGui::InvisibleButton(("##" + control).c_str(), size)) visible = !visible;
+  const bool clicked = ImGui::InvisibleButton(("##" + control).c_str(), size);
   ui_.remember(control.c_str(), "Shows or hides the object. A hidden object casts no shadow.");
   const ImVec2 middle(corner.x + 0.5f * size.x, corner.y + 0.5f * size.y);
   const ImU32 color = ImGui::GetColorU32(visible ? ImGuiCol_Text : ImGuiCol_TextDisabled, visible ? 0.85f : 0.6f);
@@ -223,6 +307,7 @@ void Outliner::eye(const std::string& control, bool& visible) {
   if (visible) list.AddBezierQuadratic(left, {middle.x, middle.y - high}, right, color, ui_.px(1.2f));
   list.AddBezierQuadratic(left, {middle.x, middle.y + high}, right, color, ui_.px(1.2f));
   if (visible) list.AddCircleFilled(middle, ui_.px(2.0f), color, 12);
+  return clicked;
 }
 
 void Outliner::name_field(Model& model, const Item& item) {

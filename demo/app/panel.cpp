@@ -18,6 +18,7 @@
 #include "history.hpp"
 #include "menus.hpp"
 #include "renders_panel.hpp"
+#include "selection.hpp"
 #include "status_line.hpp"
 #include "tool_bar.hpp"
 
@@ -83,7 +84,8 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   const auto left = static_cast<float>(view_.x + view_.width);
   const auto top = static_cast<float>(view_.y);
-  if (model.chosen && model.chosen != seen_) model.subject = *model.chosen;
+  if (model.chosen && model.chosen != seen_ && subject_of(model) != Subject(*model.chosen))
+    select(model, *model.chosen);
   seen_ = model.chosen;
   ImGui::SetNextWindowPos({left, top});
   ImGui::SetNextWindowSize({screen.x - left, screen.y - top});
@@ -129,12 +131,18 @@ void Panel::edge(Model& model) {
   ImGui::SetCursorPos(start);
 }
 
-void Panel::display(Model& model) {
+void Panel::display(Model& model, std::vector<Command>& commands) {
   using Desc = cumulet_display_desc;
   Desc& display = model.scene.display;
   settings::for_each<Desc>([&](const auto& setting) {
     if (setting.is(&Desc::background_color) && display.background != CUMULET_BACKGROUND_COLOR) return;
     rows_.draw(setting, display.*setting.field);
+    if (!setting.is(&Desc::exposure_stops)) return;
+    ImGui::BeginDisabled(!model.status.has_content);
+    if (ui_.button("Auto exposure", "Sets the exposure that suits the displayed image. Ctrl+Z undoes that.",
+                   {-1.0f, 0.0f}))
+      commands.push_back({Action::auto_exposure});
+    ImGui::EndDisabled();
   });
 }
 

@@ -45,7 +45,7 @@ class Panel {
   // Draws the left edge of the panel, which can be dragged.
   void edge(Model& model);
   void inspector(Model& model, std::vector<Command>& commands);
-  void render(Model& model);
+  void render(Model& model, std::vector<Command>& commands);
   void volume(Model& model, const Item& item, std::vector<Command>& commands);
   void object(SceneVolume& volume, const Item& item, std::vector<Command>& commands);
   void name_row(std::string& name);
@@ -53,7 +53,7 @@ class Panel {
   void camera(Model& model, std::vector<Command>& commands);
   /// Draws the saved cameras of the scene.
   void cameras(Model& model);
-  void display(Model& model);
+  void display(Model& model, std::vector<Command>& commands);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
   /// Draws the transform of a volume.
@@ -68,6 +68,8 @@ class Panel {
   void timeline(Model& model, std::vector<Command>& commands);
   void medium(Model& model, std::vector<Command>& commands);
   void ramps(Model& model);
+  // Draws the presets of a ramp, and the buttons that copy and paste it.
+  void shape_ramp(Model& model, std::size_t index);
   void surfaces(Model& model);
   void variant(Model& model);
   void grid(Model& model);

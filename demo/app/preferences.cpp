@@ -73,6 +73,7 @@ Preferences load_preferences(const std::string& path) {
         std::clamp(json.value("panel_width", preferences.panel_width), min_panel_width, max_panel_width);
     const int percent = json.value("scale_percent", preferences.scale_percent);
     preferences.scale_percent = percent == 0 ? 0 : std::clamp(percent, 100, 200);
+    preferences.auto_exposure = json.value("auto_exposure", preferences.auto_exposure);
     preferences.autosave_seconds =
         std::clamp(json.value("autosave_seconds", preferences.autosave_seconds), min_autosave, max_autosave);
     preferences.height = std::clamp(json.value("height", preferences.height), min_side, max_side);
@@ -92,6 +93,7 @@ void save_preferences(const Preferences& preferences, const std::string& path) {
   json["height"] = preferences.height;
   json["panel_width"] = preferences.panel_width;
   json["scale_percent"] = preferences.scale_percent;
+  json["auto_exposure"] = preferences.auto_exposure;
   json["autosave_seconds"] = preferences.autosave_seconds;
   std::error_code error;
   fs::create_directories(fs::path(path).parent_path(), error);

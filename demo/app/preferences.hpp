@@ -19,6 +19,7 @@ struct Preferences {
   int height = 900;
   float panel_width = 372.0f;      // at user interface scale 1
   int scale_percent = 0;           // of the user interface; 0: as the screen
+  bool auto_exposure = true;       // measure the exposure after each load
   double autosave_seconds = 60.0;  // between two copies of unsaved changes
 
   /// Puts a file at the top of the recent files and stores its folder. Scenes do not displace other files, and vice

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <optional>
 #include <ramp.hpp>
+#include <span>
+#include <string>
 
 namespace cumulet::demo {
 
@@ -24,5 +26,20 @@ std::optional<std::size_t> add_point(settings::RampPoints& points, settings::Ram
 void move_point(settings::RampPoints& points, std::size_t index, settings::RampPoint to);
 /// Removes a point. Returns false if only two are left, the minimum for a ramp.
 bool remove_point(settings::RampPoints& points, std::size_t index);
+
+/// A shape of a ramp for the panel.
+struct RampPreset {
+  const char* label;
+  const char* tip;
+  std::span<const settings::RampPoint> points;  // for values from 0 to 1
+};
+[[nodiscard]] std::span<const RampPreset> ramp_presets();
+/// Returns the points of a preset for a grid with values from 0 to max_value.
+[[nodiscard]] settings::RampPoints points_of(const RampPreset& preset, float max_value);
+
+/// Returns the points as the flags of ramps take them: "0:0,0.5:0.1,1:1".
+[[nodiscard]] std::string ramp_text(const settings::RampPoints& points);
+/// Returns the points of such a text; nullopt if it is not one.
+[[nodiscard]] std::optional<settings::RampPoints> ramp_of_text(const std::string& text);
 
 }  // namespace cumulet::demo

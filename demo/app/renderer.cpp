@@ -228,6 +228,7 @@ void Renderer::publish(std::size_t slot, bool drawn) {
       if (!answer.density_scale) answer.density_scale = answer_->density_scale;
       if (!answer.look) answer.look = answer_->look;
       if (!answer.picked) answer.picked = answer_->picked;
+      if (!answer.metered) answer.metered = answer_->metered;
       answer_->notices.insert(answer_->notices.end(), answer.notices.begin(), answer.notices.end());
       answer.notices = std::move(answer_->notices);
       answer_->files.insert(answer_->files.end(), answer.files.begin(), answer.files.end());

@@ -228,6 +228,50 @@ Item duplicate_item(SceneOptions& scene, const Item& item) {
   return made;
 }
 
+namespace {
+
+template <class Value>
+void move_within(std::vector<Value>& all, std::size_t from, std::size_t to) {
+  const auto at = [&](std::size_t index) { return all.begin() + static_cast<std::ptrdiff_t>(index); };
+  if (from < to)
+    std::rotate(at(from), at(from + 1), at(to + 1));
+  else
+    std::rotate(at(to), at(from), at(from + 1));
+}
+
+void move_volume(SceneOptions& scene, std::size_t from, std::size_t to) {
+  if (scene.volume.empty()) return move_within(scene.others, from - 1, to - 1);
+  const auto bounces = scene.medium.max_bounces;  // the first volume's value applies to all
+  SceneVolume& first = scene;
+  scene.others.insert(scene.others.begin(), std::move(first));
+  move_within(scene.others, from, to);
+  first = std::move(scene.others.front());
+  scene.others.erase(scene.others.begin());
+  for (SceneVolume& other : scene.others) other.medium.max_bounces = 0;
+  scene.medium.max_bounces = bounces;
+}
+
+}  // namespace
+
+std::optional<Item> move_item(SceneOptions& scene, const Item& from, const Item& to) {
+  if (from == to || from.kind != to.kind) return std::nullopt;
+  switch (from.kind) {
+    case Item::Kind::volume:
+      if (from.index == to.index)
+        move_within(volume_at(scene, from.index).transforms, from.transform_index, to.transform_index);
+      else
+        move_volume(scene, from.index, to.index);
+      break;
+    case Item::Kind::model:
+      move_within(scene.models, from.index, to.index);
+      break;
+    case Item::Kind::analytic_light:
+      move_within(scene.analytic_lights, from.index, to.index);
+      break;
+  }
+  return Item{from.kind, to.index, from.index == to.index ? to.transform_index : from.transform_index};
+}
+
 void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index) {
   if (!chosen || chosen->kind != kind || chosen->index < index) return;
   if (chosen->index == index)

@@ -48,6 +48,10 @@ void remove_item(SceneOptions& scene, const Item& item);
 /// Duplicates an item and returns the copy.
 Item duplicate_item(SceneOptions& scene, const Item& item);
 
+/// Moves an item to the place of another one of its kind; the items between them move by one place. An instance moves
+/// within its volume, or else with all its volume. Returns the moved item; nullopt if the order stays.
+std::optional<Item> move_item(SceneOptions& scene, const Item& from, const Item& to);
+
 /// Updates the selection after an item was removed: clears it, or adjusts the index of a later item.
 void forget(std::optional<Item>& chosen, Item::Kind kind, std::size_t index);
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <first_view.hpp>
 #include <program.hpp>
 #include <settings.hpp>
 #include <span>
@@ -302,6 +303,7 @@ void Session::see_work() {
                         !status_.boxes.volumes.empty() || !status_.boxes.models.empty();
   follow_backdrop();
   measure_noise();
+  measure_exposure();
   finish_saves();
 }
 
@@ -347,6 +349,11 @@ void Session::see_camera() {
   cumulet_camera_desc now{};
   now.struct_size = sizeof now;
   if (cumulet_camera_get(camera_.get(), &now) != CUMULET_OK || same(now, seen_)) return;
+  // The library has placed the camera.
+  if (needs_fit(seen_) && scene_.surface_camera < 0) {
+    turn_to_first_view(viewer_.get());
+    static_cast<void>(cumulet_camera_get(camera_.get(), &now));
+  }
   events_.camera_moved = true;
   seen_ = now;
   if (now.fovy_degrees == 0.0) now.fovy_degrees = scene_.camera.fovy_degrees;
@@ -467,6 +474,7 @@ void Session::move_by_keys(int key) {
 
 void Session::execute(const Request& request) {
   if (request.type == Request::Type::suggest_density) return suggest_density();
+  if (request.type == Request::Type::meter_exposure) return meter_.request();
   if (request.type == Request::Type::pick) return pick(request.x, request.y);
   if (request.type == Request::Type::frame_all) {
     if (status_.has_volume || !scene_.others.empty() || !surfaces_.shown.empty() || !scene_.models.empty())
@@ -513,6 +521,16 @@ void Session::follow_navigation() {
   // A rotating camera gives only previews.
   if (!saves_.empty()) navigation.turntable_degrees_per_second = 0.0;
   if (given_.take(navigation)) check(cumulet_set_navigation(viewer_.get(), &navigation));
+}
+
+void Session::measure_exposure() {
+  const cumulet_frame_result& frame = status_.frame;
+  // Previews light surfaces without shadows.
+  const bool preview =
+      (frame.flags & CUMULET_RENDER_PREVIEW) != 0 && (!surfaces_.shown.empty() || !scene_.models.empty());
+  const bool complete = !waits() && !status_.busy && !preview && frame.width > 0 && frame.progress > 0.0 &&
+                        scene_.sampling.view == CUMULET_VIEW_SHADED;
+  if (auto metered = meter_.follow(viewer_.get(), complete)) events_.metered = *metered;
 }
 
 // Measures the noise once per second while the image refines.

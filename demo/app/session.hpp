@@ -16,6 +16,7 @@
 #include <transforms.hpp>
 #include <vector>
 
+#include "auto_exposure.hpp"
 #include "given_settings.hpp"
 #include "model.hpp"
 #include "picture_job.hpp"
@@ -32,7 +33,7 @@ struct ViewerInput {
 
 /// A one-time request, in addition to DesiredState.
 struct Request {
-  enum class Type { frame_all, save_png, save_exr, forget_saves, suggest_density, pick };
+  enum class Type { frame_all, save_png, save_exr, forget_saves, suggest_density, meter_exposure, pick };
   Type type = Type::frame_all;
   std::string path = {};
   double x = 0.0;  // pick: position in image pixels
@@ -93,6 +94,7 @@ struct AnswerEvents {
   std::optional<double> density_scale;      // suggested density scale
   std::optional<cumulet_medium_desc> look;  // default medium of a volume that was requested with `unsaid`
   std::optional<Picked> picked;             // result of the last pick
+  std::optional<Metered> metered;           // requested exposure
   std::vector<Notice> notices;
   std::vector<File> files;
 };
@@ -144,8 +146,8 @@ class Session {
   [[nodiscard]] std::string write(const PictureFile& file);
   /// Returns true if work is not finished.
   [[nodiscard]] bool more() const;
-  /// Returns true while a file is read or a grid is built, so that the progress should be polled.
-  [[nodiscard]] bool busy() const { return status_.busy; }
+  /// Returns true while a file or the image is read or a grid is built, so that the progress should be polled.
+  [[nodiscard]] bool busy() const { return status_.busy || meter_.reads(); }
   /// Returns the current state. Notices and files are returned once.
   [[nodiscard]] Answer answer();
 
@@ -227,6 +229,7 @@ class Session {
   void see_boxes();
   void move_by_keys(int key);
   void measure_noise();
+  void measure_exposure();
   /// Returns the viewer's volume, or null.
   VolumePtr shown();
   void suggest_density();
@@ -272,6 +275,7 @@ class Session {
     double measured_at = 0.0;
     std::uint64_t samples = 0;
   } noise_;
+  ExposureMeter meter_;
   AnswerEvents events_;
   Status status_;
   VolumePtr backdrop_;  // empty volume, used while only an environment is shown

@@ -87,6 +87,17 @@ void draw_region(const Pen& pen) {
   }
 }
 
+void draw_exposure(const Pen& pen) {
+  constexpr float radius = 4.0f;
+  pen.arc(radius, 0.0f, 2.0f * std::numbers::pi_v<float>);
+  pen.disk({0.0f, 0.0f}, 2.0f);
+  for (int i = 0; i < 8; ++i) {
+    const float angle = 0.25f * std::numbers::pi_v<float> * static_cast<float>(i);
+    const ImVec2 ray(std::cos(angle), std::sin(angle));
+    pen.line({6.0f * ray.x, 6.0f * ray.y}, {8.5f * ray.x, 8.5f * ray.y});
+  }
+}
+
 struct Entry {
   const char* control;
   const char* tip;
@@ -104,6 +115,10 @@ const std::vector<Entry>& entries() {
       {"Tool/Scale", "Scale the selected object by its handles.", tool(Tool::scale), draw_scale},
       {"Tool/Frame all", "Fit the whole scene into the image.", {Action::frame_all}, draw_frame},
       {"Tool/Region", "Drag the region of the image that is rendered.", {Action::draw_region}, draw_region},
+      {"Tool/Auto exposure",
+       "Set the exposure that suits the displayed image.",
+       {Action::auto_exposure},
+       draw_exposure},
   };
   return all;
 }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "app.hpp"
+#include "selection.hpp"
 
 // Scene files, and the protection of unsaved changes.
 namespace cumulet::demo {
@@ -41,8 +42,7 @@ void App::show(SceneOptions scene, const std::string& path) {
   scene.height = model_.scene.height;
   model_.scene = std::move(scene);
   model_.scene_path = path;
-  model_.chosen.reset();
-  model_.subject.reset();
+  deselect(model_);
   loading_.reload = true;
   loading_.fit = needs_fit(model_.scene.camera);
   changes_->reset();
@@ -50,6 +50,7 @@ void App::show(SceneOptions scene, const std::string& path) {
 
 void App::new_scene() {
   SceneOptions scene = parse_demo_options({}, std::cout)->scene;
+  derived_ = {};
   loading_.suggest = true;
   model_.unchosen_ground = true;
   show(std::move(scene), "");
@@ -60,6 +61,8 @@ bool App::open_scene(const std::string& path, const std::string& source) {
     SceneOptions scene = load_scene(source);
     loading_.suggest = scene.auto_density_scale && scene.medium.density_scale == 0.0;
     model_.unchosen_ground = false;
+    derived_ = {};
+    derived_.exposure_given = true;
     loading_.scene = path;
     show(std::move(scene), path);
     return true;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cumulet::image {
@@ -51,6 +52,14 @@ void write_exr(const std::string& path, const Image& image);
 /// Writes a portable float map: RGB without alpha, little-endian, bottom row first. Values stay linear and unchanged.
 void write_pfm(const std::string& path, const Image& image);
 
+/// The bytes of a PNG, width x height x 4, straight alpha; the first pixel is at the top left.
+struct PngPixels {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<std::uint8_t> rgba;
+};
+/// Decodes the content of a PNG file. name: for errors.
+[[nodiscard]] PngPixels decode_png(std::string_view file, const std::string& name);
 /// Decodes with the sRGB curve only: tone mapping is not inverted.
 [[nodiscard]] Image read_png(const std::string& path);
 /// Reads the channels R, G, B (missing: 0) and A (missing: 1) of any type.

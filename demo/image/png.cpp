@@ -132,22 +132,28 @@ void write_png(const std::string& path, std::uint32_t width, std::uint32_t heigh
   write_bytes(path, width, height, 4, rgba);
 }
 
-Image read_png(const std::string& path) {
-  const std::string bytes = read_file(path);
+PngPixels decode_png(std::string_view file, const std::string& name) {
   int width = 0;
   int height = 0;
   int channels = 0;
-  if (bytes.size() > 0x7fffffff) fail(path, "too large for a PNG");
+  if (file.size() > 0x7fffffff) fail(name, "too large for a PNG");
   const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
-      stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(bytes.data()), static_cast<int>(bytes.size()), &width,
+      stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(file.data()), static_cast<int>(file.size()), &width,
                             &height, &channels, 4),
       stbi_image_free);
-  if (pixels == nullptr) fail(path, std::string("not a readable PNG: ") + stbi_failure_reason());
-  check_size(path, width, height);
-  Image image{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
-  image.rgba.resize(std::size_t{4} * image.width * image.height);
+  if (pixels == nullptr) fail(name, std::string("not a readable PNG: ") + stbi_failure_reason());
+  check_size(name, width, height);
+  PngPixels decoded{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height), {}};
+  decoded.rgba.assign(pixels.get(), pixels.get() + std::size_t{4} * decoded.width * decoded.height);
+  return decoded;
+}
+
+Image read_png(const std::string& path) {
+  const PngPixels pixels = decode_png(read_file(path), path);
+  Image image{pixels.width, pixels.height, {}};
+  image.rgba.resize(pixels.rgba.size());
   for (std::size_t i = 0; i < image.rgba.size(); ++i) {
-    const float value = static_cast<float>(pixels.get()[i]) / 255.0f;
+    const float value = static_cast<float>(pixels.rgba[i]) / 255.0f;
     image.rgba[i] = i % 4 == 3 ? value : srgb_decode(value);
   }
   return image;

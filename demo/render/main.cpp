@@ -30,6 +30,7 @@
 #include "denoised.hpp"
 #include "early_pictures.hpp"
 #include "fire.hpp"
+#include "first_view.hpp"
 #include "frame_plan.hpp"
 #include "frame_report.hpp"
 #include "info.hpp"
@@ -610,6 +611,15 @@ EarlyPictures early_pictures(const RenderOptions& options) {
   return EarlyPictures(options.format == OutputFormat::png && alone ? std::optional(first_seconds) : std::nullopt);
 }
 
+bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
+
+/// Places the camera if the scene has none.
+void place_camera(const Viewer& viewer, const RenderOptions& options) {
+  if (!fits(options.scene.camera) || options.scene.surface_camera >= 0) return;
+  static_cast<void>(render_frame(viewer, options, draw_only_ms));  // the library places it
+  cumulet::demo::turn_to_first_view(viewer.get());
+}
+
 void render(const RenderOptions& options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
@@ -620,6 +630,7 @@ void render(const RenderOptions& options) {
   studio.load(options.scene);
   studio.remark(options.scene);
   studio.choose_in_surfaces(options);
+  place_camera(studio.viewer(), options);
   const Traced traced = studio.trace(options, from, early_pictures(options));
   if (traced == Traced::stopped && !options.checkpoint.empty())
     throw std::runtime_error(options.output + ": interrupted: run the same command to resume from " +
@@ -636,23 +647,11 @@ void render(const RenderOptions& options) {
   studio.print_result(options, traced, true);
 }
 
-bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
-
 /// Returns true if none of the settings shared by a sequence's frames has to be derived from a volume.
 bool is_settled(const SceneOptions& scene) {
   const bool has_camera = scene.surface_camera >= 0 || !fits(scene.camera);
   const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
   return has_camera && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
-}
-
-/// Returns the height of a ground plane below all objects. With models it is slightly lower, because many models
-/// contain their own floor. Throws if the scene is empty.
-double ground_below(const Viewer& viewer, const SceneOptions& scene) {
-  std::array<double, 3> least{};
-  std::array<double, 3> most{};
-  check(viewer, cumulet_get_bounds(viewer.get(), least.data(), most.data()));
-  const double size = std::hypot(most[0] - least[0], most[1] - least[1], most[2] - least[2]);
-  return least[1] - (scene.surfaces.empty() && scene.models.empty() ? 0.0 : 1e-4 * size);
 }
 
 /// Sets the settings that are derived from the loaded volume: density scale, temperature scale, ground height and
@@ -675,11 +674,10 @@ void settle(const Viewer& viewer, RenderOptions& options) {
   }
   if (scene.ground.mode == CUMULET_GROUND_BELOW) {
     scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
-    scene.ground.height = ground_below(viewer, scene);
+    scene.ground.height = cumulet::demo::ground_below(viewer, scene);
     check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
   }
-  // The first rendered frame fits the camera to the scene.
-  static_cast<void>(render_frame(viewer, options, draw_only_ms));
+  place_camera(viewer, options);
   cumulet_camera* camera = nullptr;
   check(viewer, cumulet_get_camera(viewer.get(), &camera));
   const cumulet_status status = cumulet_camera_get(camera, &scene.camera);
@@ -703,7 +701,8 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
     const std::string state = cumulet::demo::volume_state(volume);  // before: it may be replaced meanwhile
     try {
       studio->load(probe);
-      static_cast<void>(ground_below(studio->viewer(), probe));  // throws if the volume is empty, to try the next one
+      static_cast<void>(
+          cumulet::demo::ground_below(studio->viewer(), probe));  // throws if the volume is empty, to try the next one
     } catch (const std::runtime_error&) {
       check_not_interrupted();
       continue;  // the error is reported when that frame is rendered

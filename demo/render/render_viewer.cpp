@@ -51,6 +51,14 @@ std::shared_ptr<cumulet_volume> volume_of(const Viewer& viewer) {
   return {volume, cumulet_volume_release};
 }
 
+double ground_below(const Viewer& viewer, const SceneOptions& scene) {
+  std::array<double, 3> least{};
+  std::array<double, 3> most{};
+  check(viewer, cumulet_get_bounds(viewer.get(), least.data(), most.data()));
+  const double size = std::hypot(most[0] - least[0], most[1] - least[1], most[2] - least[2]);
+  return least[1] - (scene.surfaces.empty() && scene.models.empty() ? 0.0 : 1e-4 * size);
+}
+
 cumulet_stats stats_of(const Viewer& viewer) {
   cumulet_stats stats{};
   stats.struct_size = sizeof stats;

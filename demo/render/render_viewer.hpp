@@ -29,6 +29,9 @@ void show_camera(const Viewer& viewer, const SceneOptions& scene);
 /// Returns the viewer's volume, with a reference.
 [[nodiscard]] std::shared_ptr<cumulet_volume> volume_of(const Viewer& viewer);
 [[nodiscard]] cumulet_stats stats_of(const Viewer& viewer);
+/// Returns the height of a ground plane below all objects. With models it is slightly lower, because many models
+/// contain their own floor. Throws if the scene is empty.
+[[nodiscard]] double ground_below(const Viewer& viewer, const SceneOptions& scene);
 /// Returns vendor, renderer and version: other drivers may not give bit-identical images.
 [[nodiscard]] std::string driver_of(const Viewer& viewer);
 

@@ -38,7 +38,7 @@ class Session:
         return subprocess.run([self.demo, *arguments], cwd=self.out, env=self.environment, timeout=900,
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
 
-    def play(self, name, replay, *arguments, size=SIZE):
+    def play(self, name, replay, *arguments, size=SIZE, auto_exposure=False):
         (self.out / f"{name}.replay").write_text("\n".join(replay) + "\n")
         samples = [] if "--spp" in arguments else ["--spp", "6"]
         # Tests compare the samples, not the denoised image.
@@ -49,6 +49,9 @@ class Session:
         # value.
         if not {"--scene", "--max-bounces", "auto"} & set(arguments):
             scale += ["--max-bounces", "8"]
+        # A given exposure disables auto exposure.
+        if not auto_exposure and not {"--scene", "--exposure"} & set(arguments):
+            scale += ["--exposure", "0"]
         done = self.start([*size, *samples, *scale, *arguments, "--replay", f"{name}.replay"])
         assert done.returncode == 0, f"{name}: {done.returncode}: {done.stderr}"
 

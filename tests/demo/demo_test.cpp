@@ -62,6 +62,20 @@ TEST(RampEdit, StaysAValidRamp) {
   }
 }
 
+TEST(RampEdit, PresetsAndTextsAreValidRamps) {
+  EXPECT_GE(ramp_presets().size(), 5u);
+  for (const RampPreset& preset : ramp_presets()) {
+    for (const float most : {1.0f, 0.003f, 4000.0f}) {
+      const Points points = points_of(preset, most);
+      EXPECT_EQ(cumulet::settings::ramp_refusal(points), "") << preset.label;
+      EXPECT_EQ(points.back()[0], most);
+      EXPECT_EQ(ramp_of_text(ramp_text(points)), points) << preset.label;
+    }
+  }
+  EXPECT_EQ(ramp_text({{0.0f, 0.0f}, {0.5f, 0.25f}}), "0:0,0.5:0.25");
+  for (const char* text : {"", "none", "hello", "0:0", "1:0,0:0"}) EXPECT_FALSE(ramp_of_text(text)) << text;
+}
+
 TEST(RampEdit, FitsTheViewWithAMargin) {
   RampView view;
   view.chosen = 5;

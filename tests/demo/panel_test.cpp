@@ -14,6 +14,7 @@
 #include "model.hpp"
 #include "panel.hpp"
 #include "rows.hpp"
+#include "selection.hpp"
 #include "support/folder.hpp"
 
 namespace {
@@ -100,6 +101,21 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
     ImGui::GetIO().MouseDown[button] = false;
     frame(middle);
     frame(middle);
+  }
+
+  void drag_mouse(const ImVec2& from, const ImVec2& to) {
+    frame(from);
+    ImGui::GetIO().MouseDown[0] = true;
+    frame(from);
+    constexpr int steps = 6;
+    for (int i = 1; i <= steps; ++i) {
+      const float part = static_cast<float>(i) / steps;
+      frame({from.x + (to.x - from.x) * part, from.y + (to.y - from.y) * part});
+    }
+    frame(to);
+    ImGui::GetIO().MouseDown[0] = false;
+    frame(to);
+    frame(to);
   }
 
   Model model_;
@@ -245,6 +261,77 @@ TEST_P(PanelTest, OutlinerSelectsHidesAndDeletes) {
   click("Eye/Volume 1");
   EXPECT_FALSE(model_.scene.visible);
   EXPECT_EQ(subject_of(model_), Subject(Part::sun_sky)) << "an eye selects nothing";
+}
+
+TEST_P(PanelTest, OutlinerSelectsSeveral) {
+  if (GetParam().second.y < 800.0f * GetParam().first) GTEST_SKIP() << "the list scrolls";
+  model_.scene.volume = "/a/cloud.vdb";
+  model_.scene.analytic_lights.push_back(model_.scene.analytic_lights.back());
+  frame();
+  frame();
+  const auto light = [](std::size_t index) { return Item{Item::Kind::analytic_light, index, 0}; };
+  ImGuiIO& io = ImGui::GetIO();
+  click("Scene/Light 1");
+  io.KeyCtrl = true;
+  click("Scene/Light 3");
+  io.KeyCtrl = false;
+  EXPECT_EQ(selected_items(model_), (std::vector<Item>{light(0), light(2)}));
+  click("Scene/Light 2");
+  EXPECT_EQ(selected_items(model_), std::vector<Item>{light(1)});
+  io.KeyShift = true;
+  click("Scene/Volume 1");
+  EXPECT_EQ(selected_items(model_).size(), 3u) << "the rows from the light to the volume";
+  click("Scene/Light 1");
+  io.KeyShift = false;
+  EXPECT_EQ(selected_items(model_), (std::vector<Item>{light(0), light(1)}));
+  // A box from the group's name over the first two lights.
+  const Rectangle first = *panel_.ui().find("Scene/Light 1");
+  const Rectangle second = *panel_.ui().find("Scene/Light 2");
+  const auto x = static_cast<float>(first.x + 0.5 * first.width);
+  select(model_, light(2));
+  drag_mouse({x, static_cast<float>(first.y - 0.5 * first.height)},
+             {x, static_cast<float>(second.y + 0.5 * second.height)});
+  EXPECT_EQ(selected_items(model_), (std::vector<Item>{light(0), light(1)}));
+}
+
+TEST_P(PanelTest, OutlinerRowsMoveByDragging) {
+  if (GetParam().second.y < 800.0f * GetParam().first) GTEST_SKIP() << "the list scrolls";
+  model_.scene.analytic_lights.push_back(model_.scene.analytic_lights.back());
+  for (std::size_t i = 0; i < 3; ++i) model_.scene.analytic_lights[i].power = static_cast<float>(i + 1);
+  frame();
+  frame();
+  const auto middle = [&](const char* control) {
+    const Rectangle row = *panel_.ui().find(control);
+    return ImVec2(static_cast<float>(row.x + 0.5 * row.width), static_cast<float>(row.y + 0.5 * row.height));
+  };
+  drag_mouse(middle("Scene/Light 1"), middle("Scene/Light 3"));
+  EXPECT_EQ(model_.scene.analytic_lights[0].power, 2.0f);
+  EXPECT_EQ(model_.scene.analytic_lights[2].power, 1.0f);
+  EXPECT_EQ(subject_of(model_), Subject(Item{Item::Kind::analytic_light, 2, 0}));
+  drag_mouse(middle("Scene/Light 1"), middle("Scene/Camera"));
+  EXPECT_EQ(model_.scene.analytic_lights[0].power, 2.0f) << "a part is no place for a light";
+}
+
+TEST_P(PanelTest, RampsAreCopiedAndPasted) {
+  model_.scene.volume = "/a/cloud.vdb";
+  model_.scene.ramps[0] = {{0.0f, 0.0f}, {0.5f, 0.25f}, {1.0f, 1.0f}};
+  model_.scene.ramps[1] = {{0.0f, 0.0f}, {1.0f, 1.0f}};
+  select(model_, Item{Item::Kind::volume, 0, 0});
+  const auto press = [&](const char* control) {
+    for (int i = 0; i < 5; ++i) {
+      panel_.ui().bring_into_view(control);
+      frame();
+    }
+    click(control);
+  };
+  press("Copy##density");
+  press("Paste##temperature");
+  EXPECT_EQ(model_.scene.ramps[1], model_.scene.ramps[0]);
+  ImGui::SetClipboardText("no curve");
+  press("Paste##density");
+  EXPECT_EQ(model_.scene.ramps[0].size(), 3u);
+  ASSERT_FALSE(model_.messages.empty());
+  EXPECT_EQ(model_.messages.back().text, "The clipboard has no curve");
 }
 
 TEST_P(PanelTest, RightClickResetsASetting) {
@@ -417,7 +504,7 @@ TEST(Menus, ReachEveryAction) {
       Action::add_volume,      Action::add_model, Action::save_scene_as,  Action::save_png,    Action::save_exr,
       Action::discard_changes, Action::recover,   Action::cancel,         Action::choose_grid, Action::discard_recovery,
       Action::clear_log,       Action::render,    Action::show_in_folder, Action::quit_anyway, Action::cancel_render,
-      Action::clear_renders,   Action::daylight};
+      Action::clear_renders,   Action::daylight,  Action::open_sample};
   for (int i = 0; i <= static_cast<int>(Action::daylight); ++i) {
     const auto action = static_cast<Action>(i);
     const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {

@@ -1,5 +1,7 @@
 """Tests of session.py: keyboard and mouse."""
 
+import shutil
+import subprocess
 import threading
 import time
 
@@ -51,6 +53,29 @@ def test_outliner(s):
     assert [width(name) for name in ("menu", "scaled", "wide")] == [372, 550, 400], "at most half of the window"
 
 
+def test_selection(s):
+    """Several objects are selected by Ctrl and Shift and by a box, and are duplicated, hidden and removed together, each
+    as one step. A drag changes the order."""
+    there = ["frames 2", "wait loaded", "frames 2"]
+    s.play("replay", ["wait loaded", *3 * ['click "Add light"', "frames 3"], *shown("Volume 1"), "press ctrl", 'click "Scene/Light 2"',
+                      "release ctrl", "frames 2", *shot("two"), "key ctrl+d", *there, *shot("duplicated"), "key h", *there,
+                      'report "hidden.json"', "key ctrl+z", "key delete", *there, 'report "removed.json"', "key ctrl+z", *there,
+                      *shown("Light 1"), "press shift", 'click "Scene/Light 3"', "release shift", "frames 2", *shot("range"),
+                      'drag "Scene/Light 1" 0.5 -0.6 to "Scene/Light 2"', "frames 2", "key delete", *there, *shot("boxed"),
+                      'click "Eye/Volume 2"', *there, 'drag "Scene/Volume 1" to "Scene/Volume 2"', *there, *tab("Edit"), *shot("order"), "key escape"],
+           "--volume", s.cumulus, "--spp", "1", size=["--size", "1100x800"])
+    count = lambda name: [len(s.report(name).get(kind, [])) for kind in ("volumes", "lights")]
+    steps = lambda name: s.report(name)["undo_steps"]
+    assert [count(name) for name in ("two", "duplicated", "removed")] == [[1, 3], [2, 4], [1, 3]]
+    assert [steps(name) for name in ("two", "duplicated", "hidden", "removed")] == [3, 4, 5, 5]
+    visible = [volume.get("visible", True) for volume in s.report("hidden")["volumes"]]
+    assert visible == [True, False], "the copy was selected"
+    assert count("boxed") == [2, 2], "the box selected two lights"
+    assert steps("order") == steps("boxed") + 2, "an eye and a new order"
+    assert [volume.get("visible", True) for volume in s.report("order")["volumes"]] == [False, True]
+    assert s.report("order")["chosen"] == "Volume 2"
+
+
 def test_layout(s):
     """Takes screenshots of the parts of the interface for inspection."""
     for name, size in (("large", "1440x900"), ("small", "900x600")):
@@ -86,7 +111,11 @@ def test_tools(s):
 
 
 def test_empty_window(s):
-    """The empty window opens the file dialog and recent files."""
+    """The empty window opens the file dialog, recent files and the sample scenes."""
+    version = subprocess.run([s.demo, "--version"], stdout=subprocess.PIPE, text=True, check=True).stdout.split()[-1]
+    cache = s.out / "cache"
+    shutil.copytree(s.scene, cache / "cumulet" / f"samples-{version}")
+    s.environment["XDG_CACHE_HOME"] = str(cache)
     s.play("seen", ["wait loaded", "frames 3"], "--volume", s.cumulus)
     s.play("replay", ["wait loaded", "frames 3", *shot("empty"), 'click "Start/Open"', "frames 3", 'report "dialog.json"', "key escape",
                       "frames 3", 'click "Start/cumulus.vdb"', "frames 3", "wait loaded", "frames 3", 'report "opened.json"'],
@@ -98,6 +127,12 @@ def test_empty_window(s):
     assert report["recent"] == [str(s.cumulus)] and not report["dialog"], report["recent"]
     assert s.report("dialog")["dialog"]
     assert s.report("opened")["grid"] == "density" and not s.report("opened")["dialog"]
+    s.play("samples", ["wait loaded", "frames 3", 'click "Start/Explosion"', "frames 3", "wait loaded", "frames 3", 'report "explosion.json"',
+                       "key ctrl+n", "frames 3", "wait loaded", "frames 3", *shot("again"), 'click "Start/Cloud"', "frames 3",
+                       "wait loaded", "frames 3", 'report "cloud.json"'], "--spp", "1", size=["--size", "900x600"])
+    title = lambda name: s.report(name)["title"]
+    assert title("explosion") == "sample_explosion.json - Cumulet" and title("cloud") == "sample.json - Cumulet"
+    assert s.report("cloud")["has_volume"] and "surfaces" in s.report("cloud")["scene"]
 
 
 REFINING = ["--spp", "60000", "--volume"]  # the rendering never finishes

@@ -1,14 +1,16 @@
 """Tests of session.py: light, environments, emission and the display of colors."""
 
+import math
 import subprocess
 
-from demo_session import assert_alike, assert_differ, assert_drawn, look, SETTLE, shot, shown, tab
-from png import difference
+from demo_session import assert_alike, assert_differ, assert_drawn, assert_saved, look, SETTLE, shot, shown, tab
+from png import Picture, difference
 
 
-def write_environment(path, bright):
-    """Writes a Radiance image with 64 columns: blue, and orange where bright(column)."""
-    rows = b"".join(b"\xc0\x60\x20\x83" if bright(x) else b"\x20\x40\x80\x80" for _ in range(32) for x in range(64))
+def write_environment(path, bright, stops=0):
+    """Writes a Radiance image with 64 columns: blue, and orange where bright(column). stops: makes it brighter."""
+    orange, blue = bytes([0xc0, 0x60, 0x20, 0x83 + stops]), bytes([0x20, 0x40, 0x80, 0x80 + stops])
+    rows = b"".join(orange if bright(x) else blue for _ in range(32) for x in range(64))
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 32 +X 64\n" + rows)
 
 
@@ -240,6 +242,71 @@ def test_ramps(s):
     assert ramp("removed") == ramp("dragged")
     assert ramp("off") is None
     assert_alike(plain, look(s, "off")[0], area)
+
+
+def test_ramp_shapes(s):
+    """A ramp takes a common shape from a list, and is copied to another grid, each as one step."""
+    there = ["frames 2", "wait loaded", "frames 2"]
+    s.play("replay", ["wait loaded", "frames 3", 'click "Temperature ramp"', *there, *shot("on"), 'click "Temperature shape"', "frames 2", *shot("list"),
+                      'click "Temperature shape/Contrast"', *there, *shot("shaped"), 'click "Copy##temperature"', "frames 2",
+                      'click "Flame ramp"', *there, 'click "Paste##flame"', *there, *shot("pasted"), "key ctrl+z", *there,
+                      'report "undone.json"'],
+           "--volume", s.explosion, "--preset", "explosion", "--spp", "1", size=["--size", "900x700"])
+    ramp = lambda name, grid: s.report(name)["scene"]["medium"].get(f"{grid}_ramp")
+    shaped = ramp("shaped", "temperature")
+    assert len(shaped) == 5 and shaped[0] == [0, 0] and shaped[2][0] == shaped[2][1] < shaped[3][1], shaped
+    assert shaped[1][1] < shaped[1][0], "small values are lower"
+    assert ramp("pasted", "flame") == shaped
+    assert len(ramp("undone", "flame")) == 2 and ramp("undone", "temperature") == shaped
+
+
+def test_auto_exposure(s):
+    """A dark environment is exposed once after its load, as an undo step and without a change to save. An exposure that
+    the user has set stays; the button replaces it. A flag, a scene file and the menu disable the automatic one."""
+    write_environment(s.out / "dark.hdr", lambda x: x < 16, stops=-5)
+    write_environment(s.out / "bright.hdr", lambda x: x < 16, stops=6)
+    there = ["frames 3", "wait loaded", "wait converged", "frames 12"]
+    s.play("replay", [*there, *shot("day"), 'drop "dark.hdr"', *there, *shot("dark"), "key ctrl+z", *there, *shot("undone"),
+                      "key ]", *there, 'drop "bright.hdr"', *there, *shot("kept"), 'click "Tool/Auto exposure"', *there,
+                      *shot("asked"), *tab("Render"), 'click "Render/Auto exposure after loading"', "frames 3",
+                      'drop "dark.hdr"', *there, *shot("off")],
+           "--volume", s.cumulus, "--spp", "2", auto_exposure=True)
+    stops = lambda name: s.report(name)["scene"].get("display", {}).get("exposure_stops", 0)
+    texts = lambda name: s.report(name)["log"]
+    assert stops("day") == 0 and not texts("day"), "the default day suits the default exposure"
+    assert stops("dark") > 1.5, stops("dark")
+    assert f"Auto exposure: {stops('dark'):+.1f} stops" in texts("dark"), texts("dark")
+    assert stops("undone") == 0
+    assert abs(stops("kept") - 1 / 3) < 1e-5, "the user has set it"
+    assert stops("asked") < -1, stops("asked")
+    assert stops("off") == stops("asked"), "the menu has disabled it"
+    dark, report, area = look(s, "dark")
+    assert dark.mean(area) > look(s, "undone")[0].mean(area) + 30, "the image is brighter"
+    s.play("alone", [*there, 'drop "dark.hdr"', *there, *shot("alone")], "--spp", "2", auto_exposure=True)
+    assert stops("alone") > 1.5 and not s.report("alone")["modified"], "a file that is only viewed needs no saving"
+    s.play("given", [*there, 'drop "dark.hdr"', *there, *shot("given")], "--volume", s.cumulus, "--spp", "2")
+    assert stops("given") == 0, "--exposure 0 is given"
+    s.play("scene", [*there, 'drop "dark.hdr"', *there, *shot("scene")], "--scene", f"{s.scene}/sample.json", "--spp", "1",
+           auto_exposure=True)
+    assert stops("scene") == 0.5, "that of the scene file"
+
+
+def test_first_view(s):
+    """Scenes without a camera are seen from the left and above, and fit the image, also in cumulet-render."""
+    there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
+    s.play("volume", [*there, *shot("volume")], "--volume", s.cumulus, "--spp", "8", size=["--size", "900x600"])
+    s.play("model", [*there, *shot("model")], "--gltf", f"{s.scene}/mountains.glb", "--spp", "2", size=["--size", "900x600"])
+    for name in ("volume", "model"):
+        camera = s.report(name)["scene"]["camera"]
+        x, y, z = (a - b for a, b in zip(camera["eye"], camera["target"]))
+        assert abs(math.degrees(math.atan2(x, z)) + 40) < 0.1, camera
+        assert abs(math.degrees(math.atan2(y, math.hypot(x, z))) - 20) < 0.1, camera
+    picture, report, area = look(s, "volume")
+    x, y, width, height = report["viewport"]
+    file = s.out / "volume-render.png"
+    subprocess.run([s.renderer, s.cumulus, "--density-scale", "1", "--max-bounces", "8", "--denoise", "off", "--spp", "8",
+                    "--size", f"{int(width)}x{int(height)}", "-o", file], check=True, timeout=600)
+    assert_saved(picture, Picture(file), area)
 
 
 def test_exposure(s):
