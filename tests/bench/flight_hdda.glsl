@@ -32,8 +32,9 @@ uint cm_fly(inout CmPath p) {
     if (used > p.depth) {
       p.t += p.depth / extinction;
       ivec3 low = cm_nano_corner(cell);
-      ivec3 voxel = clamp(ivec3(floor(p.o + p.t * p.d)), low, low + cm_nano_size(cell) - 1);
-      float real = cm_nano_density(cell, voxel, majorant) / majorant;
+      vec3 at = p.o + p.t * p.d;
+      ivec3 voxel = clamp(ivec3(floor(at)), low, low + cm_nano_size(cell) - 1);
+      float real = cm_nano_density(cell, voxel, at, majorant) / majorant;
       p.depth = cm_free_depth(cm_random(p.random, p.stream));
       if (CM_RATIO != 0 && to_light && p.depth_0 > CM_MIN_PASSED) {
         p.depth_0 *= 1.0 - real;

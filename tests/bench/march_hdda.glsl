@@ -1,7 +1,9 @@
 // The strongest competitor, which a user would choose instead: a NanoVDB grid, read by PNanoVDB.h, with null collisions
 // with the majorants of its nodes (flight_hdda.glsl), by a hierarchical DDA (Museth, "NanoVDB: A GPU-Friendly and
 // Portable VDB Data Structure", SIGGRAPH Talks 2021). The benchmark substitutes it for march_voxel.glsl
-// (peer_shaders.cpp). The grid's index space is cube space, and its values are relative to the volume's maximum.
+// (peer_shaders.cpp). The grid's index space is cube space, and its values are relative to the volume's maximum. With
+// CM_LINEAR, a collision reads the eight voxels around it, and the maxima of nodes are those of the field between voxels
+// (make_nano_grid).
 //
 // A cell is a region with one majorant: the address of its node or tile, its corner in bricks with its kind, and the
 // lower node that contains it, CM_NONE if unknown.
@@ -121,13 +123,47 @@ float cm_nano_majorant(uvec3 cell) {
   return pnanovdb_read_float(cm_nano, cm_nano_at(cell.x));
 }
 
-// The density of a voxel of the region, given the region's majorant.
-float cm_nano_density(uvec3 cell, ivec3 voxel, float majorant) {
+#if CM_LINEAR
+// The value of a voxel, which may be in another region.
+float cm_nano_voxel(uvec3 cell, ivec3 voxel) {
+  ivec3 corner = cm_nano_corner(cell);
+  if (any(notEqual(voxel >> 3, corner >> 3))) {
+    bool same = cell.z != CM_NONE && all(equal(voxel >> 7, corner >> 7));
+    cell = cm_nano_find(voxel, same ? cell.z : CM_NONE);
+    if (cm_nano_kind(cell) == CM_LOWER) cell = cm_nano_in_lower(cell.x, voxel);
+  }
+  if (cm_nano_kind(cell) == CM_LEAF) return cm_nano_leaf_value(cell.x, voxel);
+  return pnanovdb_read_float(cm_nano, cm_nano_at(cell.x));
+}
+
+// The density at point p of the region's cell whose lowest corner is this voxel.
+float cm_nano_density(uvec3 cell, ivec3 voxel, vec3 p, float majorant) {
+  if (cm_nano_kind(cell) == CM_LOWER) cell = cm_nano_in_lower(cell.x, voxel);
+  if (cm_nano_kind(cell) != CM_LEAF) return 0.0;  // regions without voxels are empty cells
+  CmCellCorners corners = cm_no_corners();
+  if (all(lessThan(voxel & 7, ivec3(7)))) {
+    pnanovdb_leaf_handle_t leaf;
+    leaf.address = cm_nano_at(cell.x);
+    uint first = pnanovdb_leaf_get_value_address(CM_NANO_TYPE, cm_nano, leaf, voxel).byte_offset;
+    for (int i = 0; i < 8; ++i) {
+      ivec3 offset = cm_corner_offset(i);
+      uint address = first + 4u * uint((offset.x * 8 + offset.y) * 8 + offset.z);
+      cm_set_corner(corners, i, pnanovdb_read_float(cm_nano, cm_nano_at(address)));
+    }
+  } else {
+    for (int i = 0; i < 8; ++i) cm_set_corner(corners, i, cm_nano_voxel(cell, voxel + cm_corner_offset(i)));
+  }
+  return min(majorant, cm_trilinear(corners, clamp(p - vec3(voxel), 0.0, 1.0)));
+}
+#else
+// The density of a voxel of the region, given the region's majorant. p: unused.
+float cm_nano_density(uvec3 cell, ivec3 voxel, vec3 p, float majorant) {
   if (cm_nano_kind(cell) == CM_LOWER) cell = cm_nano_in_lower(cell.x, voxel);
   uint kind = cm_nano_kind(cell);
   if (kind == CM_LEAF) return cm_nano_leaf_value(cell.x, voxel);
   return kind == CM_LEAF_TILE ? pnanovdb_read_float(cm_nano, cm_nano_at(cell.x)) : majorant;
 }
+#endif
 
 uvec3 cm_march_enter(vec3 p) {
   ivec3 low = ivec3(CM_GRID.box_min);
