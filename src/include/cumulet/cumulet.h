@@ -46,8 +46,10 @@
  *   found. There are three exceptions: cumulet_get_stats, cumulet_attach and cumulet_context_lost wait for running [GL]
  *   calls, and cumulet_wait waits for workers.
  * - Each call is complete in itself. Two threads that read, change and set the same settings need a lock of their own.
- * - The viewer's worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render
- *   uploads the results within its time budget, and shows the last complete image until then.
+ * - Worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render uploads the
+ *   results within its time budget, and shows the last complete image until then.
+ * - All viewers of the process share the worker threads. There are at most 8, or two per processor if that is more.
+ *   Threads in a callback of the host do not count. Work waits for a free thread, and the viewers take turns.
  * - Requests are coalesced: each kind of work has at most one running and one queued request, and a new request
  *   replaces the queued one. A running build or pose is finished. A new load also cancels the running work, but not
  *   twice in a row. So a stream of requests always has some of its results displayed, and its latest request is always
