@@ -104,6 +104,13 @@ class VolumeAsset {
                                          const grid::RefineSettings& refine, Progress& progress) const;
   /// Returns the emission settings that apply to this volume: fills in values that `emission` leaves open.
   [[nodiscard]] scene::Emission emission_by(const scene::Emission& emission) const;
+  /// Returns what users of the volume share beside it, made by the first call. There is one type of it.
+  template <class Kept>
+  [[nodiscard]] std::shared_ptr<Kept> kept() const {
+    const std::scoped_lock lock(mutex_);
+    if (!kept_) kept_ = std::make_shared<Kept>();
+    return std::static_pointer_cast<Kept>(kept_);
+  }
   /// The GPU-resident state; null: voxels are in main memory.
   [[nodiscard]] const scene::StateInGlPtr& in_gl() const { return in_gl_; }
   /// True if density without a ramp has another unit than 1.
@@ -194,6 +201,7 @@ class VolumeAsset {
   };
   mutable std::optional<Weighted> weighted_;  // by density
   mutable std::shared_ptr<const VolumeAsset> interpolated_;
+  mutable std::shared_ptr<void> kept_;  // SharedGrids
 };
 
 using VolumeAssetPtr = std::shared_ptr<const VolumeAsset>;

@@ -17,6 +17,7 @@
 
 #include "base/error.hpp"
 #include "base/never_destroyed.hpp"
+#include "base/process_shared.hpp"
 
 namespace cumulet {
 
@@ -112,15 +113,26 @@ class Registry {
     const auto until = Clock::now() + (CallbackScope::inside() ? patience_in_callback : patience);
     std::erase_if(all, [](const EntryPtr& entry) {
       const std::scoped_lock lock(entry->mutex);
-      if (entry->process != getpid() || entry->thread.get_id() == std::this_thread::get_id()) return true;
+      if (entry->process != getpid()) return true;
+      // Also on this thread itself, whose callback may have called exit(): other threads may wait for its work.
       if (entry->request_stop) entry->request_stop();
-      return false;
+      return entry->thread.get_id() == std::this_thread::get_id();
     });
     for (const EntryPtr& entry : all) sleep_until_ended(*entry, entry->stoppable ? until : Clock::time_point::max());
     while (calls_ > own.calls && Clock::now() < until) std::this_thread::sleep_for(poll);
     for (const EntryPtr& entry : all) {
       if (entry->ended) join(*entry);
     }
+  }
+
+  [[nodiscard]] std::shared_ptr<void> shared(const std::function<std::shared_ptr<void>()>& make) {
+    const std::scoped_lock lock(mutex_);
+    std::shared_ptr<void> found = shared_process_ == getpid() ? shared_.lock() : nullptr;
+    if (found) return found;
+    found = make();
+    shared_ = found;
+    shared_process_ = getpid();
+    return found;
   }
 
   [[nodiscard]] bool ending() const { return ending_; }
@@ -136,6 +148,8 @@ class Registry {
 
   std::mutex mutex_;
   std::list<EntryPtr> entries_;
+  std::weak_ptr<void> shared_;
+  pid_t shared_process_ = 0;        // the process that made it
   std::atomic<pid_t> process_ = 0;  // the process that last started a thread
   std::atomic<bool> ending_ = false;
   std::atomic<int> calls_ = 0;
@@ -197,6 +211,10 @@ LibraryThread::~LibraryThread() {
 }
 
 bool LibraryThread::ended() const { return entry_->ended; }
+
+std::shared_ptr<void> shared_in_process(const std::function<std::shared_ptr<void>()>& make) {
+  return registry().shared(make);
+}
 
 HostCall::HostCall() {
   OfThread& own = of_thread();

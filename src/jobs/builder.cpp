@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "jobs/build_grid.hpp"
+#include "jobs/shared_grids.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace cumulet::viewer {
@@ -181,7 +181,7 @@ bool Builder::has_result() const {
 
 void Builder::build_of(const VolumeAssetPtr& volume, const BuildSettings& settings, double load_seconds,
                        Progress& progress, const scene::GridPlanPtr& before) {
-  Built built = build_grid(log_, volume, settings, progress, *resource_limits_, before);
+  Built built = shared_grid(log_, volume, settings, progress, *resource_limits_, before);
   built.seconds.load = load_seconds;
   const std::scoped_lock lock(mutex_);
   progress.check();

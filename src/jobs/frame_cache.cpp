@@ -211,7 +211,7 @@ void FrameCache::start() {
     worker_.forget_failure();
     return;
   }
-  worker_.post({what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }});
+  worker_.post(job());
 }
 
 bool FrameCache::is_ready(const Entry& entry) const {
@@ -319,6 +319,10 @@ std::vector<FrameCache::Entry> FrameCache::take_excess() {
 
 // ---- on the worker thread ----
 
+Worker::Job FrameCache::job() {
+  return {what, Progress::Stage::loading, [this](Progress& progress) { work(progress); }};
+}
+
 void FrameCache::work(Progress& progress) {
   std::optional<Ends> ends;
   for (;;) {
@@ -346,6 +350,7 @@ void FrameCache::work(Progress& progress) {
       }
     });
     notify();
+    if (worker_.continue_later(job())) return;
   }
 }
 

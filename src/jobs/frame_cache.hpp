@@ -142,6 +142,7 @@ class FrameCache : public JobSource {
   };
   enum class Analysis { due, done, in_vain };
 
+  [[nodiscard]] Worker::Job job();
   void work(Progress& progress);
   void analyze(const FrameFilesPtr& files, Progress& progress);
   void settle_temperature(const FrameFiles& files, const VolumeAsset& volume);

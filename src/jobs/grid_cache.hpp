@@ -1,7 +1,7 @@
 #pragma once
 
-#include "jobs/build_grid.hpp"
 #include "jobs/request_cache.hpp"
+#include "jobs/shared_grids.hpp"
 
 namespace cumulet::viewer {
 
@@ -21,7 +21,7 @@ class GridCache : public RequestCache<GridRequest, Built> {
             [log = context.log](const Request& request, Progress& progress) {
               ResourceLimits part;
               part.set_gl(request.gl_bytes);
-              return build_grid(log, request.volume, request.settings, progress, part);
+              return shared_grid(log, request.volume, request.settings, progress, part);
             },
             context) {}
 };

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "jobs/build_grid.hpp"
+#include "jobs/shared_grids.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace cumulet::viewer {
@@ -154,7 +154,7 @@ bool LiveBuilder::build(std::uint64_t job, Progress& progress) {
       const std::optional<BuildSettings> settings = settings_for(*live, *state.volume, begun.settings);
       if (!settings) return;
       // Without a result the build needs voxels, which another state will bring.
-      ready = {build_grid(log_, state.volume, *settings, progress, *resource_limits_), state.number};
+      ready = {shared_grid(log_, state.volume, *settings, progress, *resource_limits_), state.number};
       ready.built.seconds.load = load_seconds;
     });
     progress.check();

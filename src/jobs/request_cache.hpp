@@ -64,6 +64,9 @@ class RequestCache : public JobSource {
     [[nodiscard]] bool is_missing() const { return wanted && !built && !failure; }
   };
   typename std::vector<Entry>::iterator find(const Request& request);
+  [[nodiscard]] Worker::Job job() {
+    return {what_, stage_, [this](Progress& progress) { build_missing(progress); }};
+  }
   void build_missing(Progress& progress);
 
   const char* what_;
@@ -108,7 +111,7 @@ void RequestCache<Request, Made>::request(std::vector<Request> requests) {
     failed = std::ranges::any_of(cache_, [](const Entry& entry) { return entry.failure.has_value(); });
   }
   if (missing) {
-    worker_.post({what_, stage_, [this](Progress& progress) { build_missing(progress); }});
+    worker_.post(job());
   } else if (!failed) {
     worker_.forget_failure();
   }
@@ -180,6 +183,7 @@ void RequestCache<Request, Made>::build_missing(Progress& progress) {
       }
     }
     notify_();
+    if (worker_.continue_later(job())) return;
   }
   const std::scoped_lock lock(mutex_);
   for (const Entry& entry : cache_) {

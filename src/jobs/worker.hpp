@@ -1,5 +1,7 @@
 #pragma once
 
+#include <unistd.h>
+
 #include <chrono>
 #include <condition_variable>
 #include <functional>
@@ -7,17 +9,18 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "base/error.hpp"
-#include "base/library_thread.hpp"
 #include "base/progress.hpp"
 #include "base/trace.hpp"
 #include "jobs/resource_limits.hpp"
+#include "jobs/worker_pool.hpp"
 
 namespace cumulet::viewer {
 
-/// A thread that runs one job at a time. Only the newest queued job is kept. The thread starts with the first job. All
-/// calls are thread-safe; jobs may only call queries. When the process ends, jobs end as if cancelled, and new jobs are
+/// Runs one job at a time, on threads of the pool. Only the newest queued job is kept. All calls are thread-safe; jobs
+/// may only call queries and continue_later(). When the process ends, jobs end as if cancelled, and new jobs are
 /// refused with Error(cancelled).
 class Worker {
  public:
@@ -37,8 +40,12 @@ class Worker {
   };
 
   /// notify: called on the thread after a job ended. resource_limits: limits for jobs; null: none.
-  explicit Worker(std::function<void()> notify, Trace trace = {}, ResourceLimitsPtr resource_limits = nullptr)
-      : notify_(std::move(notify)), trace_(trace), resource_limits_(std::move(resource_limits)) {}
+  explicit Worker(std::function<void()> notify, Trace trace = {}, ResourceLimitsPtr resource_limits = nullptr,
+                  std::shared_ptr<WorkerPool> pool = WorkerPool::of_process())
+      : notify_(std::move(notify)),
+        trace_(trace),
+        resource_limits_(std::move(resource_limits)),
+        pool_(std::move(pool)) {}
   /// Cancels the job and waits for it.
   ~Worker();
   Worker(const Worker&) = delete;
@@ -51,6 +58,9 @@ class Worker {
   /// Replaces the queued job and cancels the running one, unless the job before it was cancelled in this way too. A
   /// wrong choice does not delay the next one, but in a stream of requests at least every second job is finished.
   void replace(Job job) { take(std::move(job), true); }
+  /// For a running job of many parts that finds out by itself what is left to do. Call it between two parts. If other
+  /// workers wait for a thread, queues `rest` unless another job is queued, and returns true: the job should return.
+  [[nodiscard]] bool continue_later(Job rest);
   /// Ends both jobs soon, with ErrorCode::cancelled.
   void cancel() { end_jobs(false); }
   /// Ends both jobs and drops their failures and that of the job before.
@@ -77,10 +87,14 @@ class Worker {
     bool dropped = false;
   };
   void take(Job job, bool replaces);
-  // Makes the thread end soon.
+  // Makes run() end soon.
   void stop();
   void end_jobs(bool loads_only);
+  // Runs jobs until none is queued.
   void run();
+  void run_one(std::unique_lock<std::mutex>& lock);
+  // Queues run() behind the waiting tasks of the pool, if there are any. mutex_ must be held.
+  bool make_way();
 
   std::function<void()> notify_;
   Trace trace_;
@@ -92,7 +106,11 @@ class Worker {
   bool last_was_replaced_ = false;
   std::optional<Error> failure_;
   bool stopping_ = false;
-  std::optional<LibraryThread> thread_;  // last: it uses all of the above
+  std::shared_ptr<WorkerPool> pool_;
+  bool active_ = false;     // run() is running, or will
+  std::thread::id runner_;  // while it is running
+  const pid_t process_ = getpid();
+  const WorkerPool::TaskPtr task_ = std::make_shared<WorkerPool::Task>([this] { run(); }, [this] { stop(); });
 };
 
 }  // namespace cumulet::viewer

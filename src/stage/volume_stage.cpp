@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "jobs/build_grid.hpp"
 #include "jobs/cell_budget.hpp"
+#include "jobs/shared_grids.hpp"
 #include "scene/origin.hpp"
 #include "scene/space.hpp"
 
@@ -506,7 +507,9 @@ void VolumeStage::rebuild() {
   for (Shown& shown : shown_) {
     shown.request.reset();
     if (shown.built) shown.built->volume = nullptr;  // stays displayed until replaced, but cannot be reused
+    forget_grids(shown.settings.volume);
   }
+  forget_grids(volume_);
   jobs_.rebuild();
   requests_due_ = true;
   take_medium();

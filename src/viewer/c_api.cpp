@@ -134,7 +134,12 @@ cumulet_status cumulet_create(const cumulet_create_desc* desc, cumulet_viewer** 
     require(number(d.gl_state) <= CUMULET_GL_STATE_HOST_RESETS, "cumulet_create_desc.gl_state is unknown");
     cumulet::Log log = cumulet::c_abi::log_of(d.log, d.log_user);
     std::function<void()> update;
-    if (d.update != nullptr) update = [call = d.update, user = d.update_user] { call(user); };
+    if (d.update != nullptr) {
+      update = [call = d.update, user = d.update_user] {
+        const core::WorkerPool::InCallback waits;
+        call(user);
+      };
+    }
     auto viewer = std::make_unique<cumulet_viewer>();
     viewer->viewer = std::make_unique<core::Viewer>(
         std::move(log), std::move(update), d.gl_state == CUMULET_GL_STATE_RESTORE,

@@ -26,6 +26,7 @@ class HostMemory {
   HostMemory(cumulet_release_fn release, void* user) : release_(release), user_(user) {}
   ~HostMemory() {
     const cumulet::CallbackScope inside;
+    const cumulet::viewer::WorkerPool::InCallback waits;
     release_(user_);
   }
   HostMemory(const HostMemory&) = delete;

@@ -32,6 +32,7 @@ class HostStream final : public ByteSource {
 
   [[nodiscard]] std::uint64_t call(std::uint64_t position, char* to, std::uint64_t wanted) const {
     const CallbackScope inside;
+    const viewer::WorkerPool::InCallback waits;
     return desc_.read(desc_.read_user, position, to, wanted);
   }
 

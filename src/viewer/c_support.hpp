@@ -19,6 +19,7 @@
 #include "base/log.hpp"
 #include "base/one_line.hpp"
 #include "cumulet/cumulet.h"
+#include "jobs/worker_pool.hpp"
 #include "scene/snapshot.hpp"
 #include "scene/space.hpp"
 #include "viewer/c_fields.hpp"
@@ -28,8 +29,10 @@ namespace cumulet::c_abi {
 /// Logs through a host's callback; drops every line if log is null.
 inline Log log_of(cumulet_log_fn log, void* user) {
   if (log == nullptr) return {};
-  return Log(
-      [log, user](LogLevel level, const char* message) { log(user, static_cast<cumulet_log_level>(level), message); });
+  return Log([log, user](LogLevel level, const char* message) {
+    const viewer::WorkerPool::InCallback waits;
+    log(user, static_cast<cumulet_log_level>(level), message);
+  });
 }
 
 inline cumulet_status status_of(ErrorCode code) {

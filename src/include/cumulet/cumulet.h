@@ -46,8 +46,10 @@
  *   found. There are three exceptions: cumulet_get_stats, cumulet_attach and cumulet_context_lost wait for running [GL]
  *   calls, and cumulet_wait waits for workers.
  * - Each call is complete in itself. Two threads that read, change and set the same settings need a lock of their own.
- * - The viewer's worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render
- *   uploads the results within its time budget, and shows the last complete image until then.
+ * - Worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render uploads the
+ *   results within its time budget, and shows the last complete image until then.
+ * - All viewers of the process share the worker threads. There are at most 8, or two per processor if that is more.
+ *   Threads in a callback of the host do not count. Work waits for a free thread, and the viewers take turns.
  * - Requests are coalesced: each kind of work has at most one running and one queued request, and a new request
  *   replaces the queued one. A running build or pose is finished. A new load also cancels the running work, but not
  *   twice in a row. So a stream of requests always has some of its results displayed, and its latest request is always
@@ -495,6 +497,10 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
  * any number of viewers may show it. The functions of this group that create a volume do so before they return;
  * cumulet_load_volume does it on a worker.
  *
+ * - Viewers that need the same grid of a volume share it: it is built once, and it is in main memory once. The grids
+ *   are the same if the grid settings are equal, and also those settings of media and limits on which a grid depends. A
+ *   camera-adaptive grid depends on the camera, too. While one viewer builds the grid, the others wait. cumulet_cancel
+ *   for one viewer does not affect the others. In GL memory each viewer has its own copy.
  * - The medium is zero outside the bounds of the active voxels.
  * - Negative and non-finite voxels of a density count as zero. So do voxels beyond 1e30 or -1e30 of every field,
  *   because fill values are as large.
@@ -2158,8 +2164,8 @@ typedef struct cumulet_limits_desc {
   uint32_t threads;
   /**
    * Maximum main memory in bytes for volumes and grids: the voxels of the displayed volume, the data that is computed
-   * from them once, and the cells (cumulet_stats.memory_bytes). For a sequence it limits all ready frames, if it is
-   * less than the sequence's memory_bytes.
+   * from them once, and the cells (cumulet_stats.memory_bytes). What viewers share, each of them counts whole. For a
+   * sequence it limits all ready frames, if it is less than the sequence's memory_bytes.
    *
    * Cells are coarsened to fit (cumulet_stats.limited). If even the coarsest do not fit, the load or build fails with
    * CUMULET_ERROR_OUT_OF_MEMORY and one line, and the displayed content stays. Not counted: temporary memory of builds,
@@ -4205,7 +4211,7 @@ typedef struct cumulet_stats {
   uint32_t levels;     /**< Deepest bisection level of any cell; 0 for the 24 cells of the control cube. */
   uint64_t cell_bytes; /**< GL memory that rays traverse: cell data and point-location tree, or voxels. */
   uint64_t active_voxels;
-  double build_seconds_total;
+  double build_seconds_total; /**< Also if another viewer built the grid. */
   double build_seconds_load;
   double build_seconds_statistics;
   double build_seconds_refine;
@@ -4234,7 +4240,8 @@ typedef struct cumulet_stats {
   double pass_seconds_display;
   double noise; /**< As found by the last cumulet_measure_noise or readback of the image. Infinite before the first one,
                      and while it is unknown. */
-  uint64_t memory_bytes; /**< Main memory that cumulet_limits_desc.memory_bytes counts. */
+  uint64_t memory_bytes; /**< Main memory that cumulet_limits_desc.memory_bytes counts. Viewers that share a volume or a
+                              grid each count all of it, so that the sum over viewers may exceed the memory in use. */
   /**
    * Samples of the image whose radiance was not finite or exceeded 1e33. They count as black, so that no NaN or
    * infinity enters the image. A warning in the log reports them once per image (once per viewer with previews). 0 is
