@@ -45,6 +45,8 @@ const char* name_of(const Choices& choices, Value value) {
 
 const char* grid_type_name(cumulet_grid_type type) { return name_of(settings::grid_type_choices, type); }
 
+const char* cells_name(cumulet_cell_density cells) { return name_of(settings::cells_choices, cells); }
+
 const char* interpolation_name(cumulet_interpolation interpolation) {
   return name_of(settings::voxel_interpolation_choices, interpolation);
 }

@@ -22,6 +22,8 @@ namespace cumulet::demo {
 
 /// Returns the name of the grid type in flags and scene files.
 [[nodiscard]] const char* grid_type_name(cumulet_grid_type type);
+/// Returns the name of the density in cells, as in flags.
+[[nodiscard]] const char* cells_name(cumulet_cell_density cells);
 /// Returns the name of an interpolation between voxels, as in flags.
 [[nodiscard]] const char* interpolation_name(cumulet_interpolation interpolation);
 

@@ -63,7 +63,7 @@ void write_stats(const RenderOptions& options, const Viewer& viewer, const char*
   json["backend"] = backend;
   json["grid_type"] = grid_type_name(grid.type);
   json["interpolation"] = interpolation_name(interpolation);
-  if (tet) json["cells_mode"] = grid.cells == CUMULET_CELLS_CONSTANT ? "constant" : "linear";
+  if (tet) json["cells_mode"] = cells_name(grid.cells);
   // A driver's name may have any encoding: invalid UTF-8 is replaced instead of throwing.
   image::replace_file(options.stats, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }

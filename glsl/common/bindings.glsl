@@ -109,6 +109,7 @@ const int CM_STORAGE_GRID_LEVELS = 5;
 const int CM_STORAGE_GRID_OWN = 6;
 const int CM_STORAGE_GRID_BINS = 7;
 const int CM_STORAGE_GRID_COARSE = 1;
+const int CM_STORAGE_GRID_CORNERS = 1;  // grid_records.comp, of cells in bricks
 const int CM_STORAGE_GRID_CELLS = 3;
 const int CM_STORAGE_GRID_LINKS = 4;
 const int CM_STORAGE_GRID_LIST = 5;

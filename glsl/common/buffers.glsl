@@ -61,10 +61,12 @@ uvec4 cm_environment_word(uint i) { return texelFetch(cm_environment_words, int(
 
 #ifdef CM_MARCH
 #define CM_CELL_CHANGES (CM_MOTION != 0 && CM_MARCH == 0)
+#define CM_CELL_CORNERS (CM_LINEAR == 2 && CM_MARCH == 0)
 #else
 #define CM_CELL_CHANGES 0
+#define CM_CELL_CORNERS 0
 #endif
-#if CM_CELL_LIGHTS || CM_CELL_CHANGES
+#if CM_CELL_LIGHTS || CM_CELL_CHANGES || CM_CELL_CORNERS
 layout(binding = CM_UNIT_CHANNELS) uniform usamplerBuffer cm_channels;
 #endif
 #if CM_CELL_LIGHTS
@@ -124,6 +126,9 @@ uvec2 cm_channel_pair(uint word) {
 uvec2 cm_velocity_record(uint cell) {
   return cm_channel_pair(CM_FIRST_RECORD(CM_CHANNEL_VELOCITY) + 2u * cell);
 }
+#endif
+#if CM_CELL_CORNERS
+uvec4 cm_corners_record(uint cell) { return texelFetch(cm_channels, int(CM_GRID.first_corners + cell)); }
 #endif
 #if CM_MOTION
 uvec2 cm_change_record(uint cell) { return cm_channel_pair(CM_GRID.first_change + 2u * cell); }

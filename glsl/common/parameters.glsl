@@ -115,6 +115,7 @@ CM_BLOCK(CmGrid) {
   uint glowing;           // number of its entries
   uint moves;             // 1: there are velocities
   uint first_change;      // CM_MOTION only: first record of density changes, in 4-byte words (CmMedium.changes)
+  uint first_corners;     // CM_LINEAR 2 only: first record of corners, in 16-byte texels
   CM_EQUALITY(CmGrid)
 };
 

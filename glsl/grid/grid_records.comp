@@ -1,7 +1,8 @@
 #version 450
 // Writes the records of a grid's cells once their order is known, like src/grid/tet_grid.cpp: of cells in bricks
 // (CM_FINE 1), or of larger ones.
-// variants: CM_FINE=0,1 CM_HALVES=0,1 or CM_FINE=0,1 CM_HALVES=0,1 CM_LINEAR=1
+// With CM_LINEAR 2, sixths of cells also have the densities of the corners of their cell.
+// variants: CM_FINE=0,1 CM_HALVES=0,1 or CM_FINE=0,1 CM_HALVES=0,1 CM_LINEAR=1 or CM_FINE=1 CM_HALVES=0,1 CM_LINEAR=2
 layout(local_size_x = 64) in;
 
 #include "common/bindings.glsl"
@@ -17,7 +18,11 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = CM_STORAGE_GRID_RECORDS) writeonly buffer CmRecords { uvec4 cm_records[]; };
 layout(std430, binding = CM_STORAGE_GRID_BRICKS) readonly buffer CmBricks { uint cm_bricks[]; };  // CM_BRICK_VALUES each
+#if !CM_FINE
 layout(std430, binding = CM_STORAGE_GRID_COARSE) readonly buffer CmCoarse { uint cm_coarse[]; };
+#elif CM_LINEAR == 2
+layout(std430, binding = CM_STORAGE_GRID_CORNERS) writeonly buffer CmCorners { uvec4 cm_corners[]; };
+#endif
 layout(location = 3) uniform float cm_to_relative;  // scale from the grid's values
 layout(location = 4) uniform bool cm_linear;
 
@@ -71,6 +76,26 @@ CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
   return CmLeaf(cm_pack(mean, gradient), high > 0.0);
 }
 
+#if CM_LINEAR == 2
+// Corner i of a sixth's cell in the sixth's frame (cm_corner_offset).
+uint cm_corner_half(uint i, uint first_value, int begin, ivec3 steps) {
+  int at = begin + int(i >> 2) * steps.x + int((i >> 1) & 1u) * steps.y + int(i & 1u) * steps.z;
+  return cm_half(cm_value(first_value + uint(at)) * cm_to_relative);
+}
+
+void cm_put_corners(uint rank, vec3 v0, uint shape, ivec3 voxel) {
+  if (cm_fine_level(shape) != 9u) return;
+  uint first_value = CM_BRICK_VALUES * cm_brick_at(voxel);
+  int begin = cm_value_at_v0(v0, shape, voxel);
+  ivec3 steps = cm_value_steps(shape);
+  uvec4 words;
+  for (uint i = 0u; i < 4u; ++i)
+    words[i] = cm_corner_half(2u * i, first_value, begin, steps) |
+               (cm_corner_half(2u * i + 1u, first_value, begin, steps) << 16);
+  cm_corners[rank] = words;
+}
+#endif
+
 #else
 
 CmLeaf cm_leaf(vec3 v0, uint shape, ivec3 voxel) {
@@ -103,7 +128,11 @@ void main() {
   uint rank = cm_cells[i].rank;
   vec3 v0 = cm_v0_of(where);
   uint shape = cm_shape_of(where);
-  CmLeaf leaf = cm_leaf(v0, shape, cm_leaf_voxel(v0, shape));
+  ivec3 voxel = cm_leaf_voxel(v0, shape);
+  CmLeaf leaf = cm_leaf(v0, shape, voxel);
+#if CM_FINE && CM_LINEAR == 2
+  cm_put_corners(rank, v0, shape, voxel);
+#endif
   if (leaf.dense) cm_put_in_box(v0, shape);
   uvec4 links = cm_links[i];
   cm_records[2u * rank] = uvec4(cm_rank_behind(links.x, i), cm_rank_behind(links.y, i), cm_rank_behind(links.z, i),

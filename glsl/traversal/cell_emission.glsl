@@ -17,7 +17,7 @@ struct CmEmission {
   float at_0;
   float slope;
   float distance;  // cm_cell_distance of o
-#if CM_CUBIC
+#if CM_CUBIC_EMISSION
   // The emission of the corners of a cell, and the ray relative to the cell; the mean is then a factor.
   CmCellCorners red;
   CmCellCorners green;
@@ -54,7 +54,7 @@ CM_FN float cm_emission_at(uvec4 record, uint cell_class, vec3 point) {
   return max(0.0f, 1.0f + dot(cm_emission_gradient(record), point - cm_frame_centroid(cell_class)));
 }
 
-#if CM_CUBIC
+#if CM_CUBIC_EMISSION
 CM_FN vec3 cm_corner_emission(CmEmission e, float t) {
   vec3 at = clamp(e.o + t * e.d, vec3(0.0f, 0.0f, 0.0f), vec3(1.0f, 1.0f, 1.0f));
   return vec3(cm_trilinear(e.red, at), cm_trilinear(e.green, at), cm_trilinear(e.blue, at));
@@ -63,7 +63,7 @@ CM_FN vec3 cm_corner_emission(CmEmission e, float t) {
 
 // Emission that a ray collects from t to t_1, without absorption.
 CM_FN vec3 cm_emitted(CmEmission e, float t, float t_1) {
-#if CM_CUBIC
+#if CM_CUBIC_EMISSION
   // Simpson's rule is exact for cubics.
   vec3 sum = cm_corner_emission(e, t) + 4.0f * cm_corner_emission(e, 0.5f * (t + t_1)) + cm_corner_emission(e, t_1);
   return e.mean * sum * (max(0.0f, t_1 - t) / 6.0f);

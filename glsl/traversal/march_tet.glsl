@@ -8,8 +8,10 @@
 //   uint cm_anisotropy_record(uint cell)    glsl/grid/channels.glsl
 // with CM_MOTION also
 //   uvec2 cm_change_record(uint cell)       change of the density in its record
-// and with CM_VELOCITY
+// with CM_VELOCITY
 //   uvec2 cm_velocity_record(uint cell)     glsl/grid/channels.glsl
+// and with CM_LINEAR 2, in which the finest cells have the trilinear function between voxels, for each of them
+//   uvec4 cm_corners_record(uint cell)      densities of the corners of its cell of eight voxels, in its frame: halves
 #ifndef CM_MARCH_TET_GLSL
 #define CM_MARCH_TET_GLSL
 
@@ -91,6 +93,40 @@ CM_FN vec4 cm_march_fit(uvec4 data, uint cell) {
   return fit;
 }
 
+#if CM_CUBIC
+// Returns true if this is the shape of a sixth of a cell of eight voxels: class B, unit 1.
+CM_FN bool cm_is_sixth(uint shape) { return (shape >> 9) == 1u; }
+
+CM_FN CmCellCorners cm_cell_corners(uint cell) {
+  uvec4 words = cm_corners_record(cell);
+  vec2 low_0 = unpackHalf2x16(words.x);
+  vec2 low_1 = unpackHalf2x16(words.y);
+  vec2 high_0 = unpackHalf2x16(words.z);
+  vec2 high_1 = unpackHalf2x16(words.w);
+  CmCellCorners corners;
+  corners.low = vec4(low_0.x, low_0.y, low_1.x, low_1.y);
+  corners.high = vec4(high_0.x, high_0.y, high_1.x, high_1.y);
+  return corners;
+}
+
+// Density of a cell from t to t_1: between the corners of a sixth, in the linear fit of a larger cell.
+CM_FN CmBernstein cm_density_along(uvec4 data, uint cell, CmFrame f, uint shape, float t, float t_1) {
+  vec4 fit = cm_march_fit(data, cell);
+  CmBernstein r = CmBernstein(0.0f);
+  if (cm_is_sixth(shape) && data.z != 0u) {
+    vec3 from = f.o - f.v0;
+    vec3 low = vec3(0.0f, 0.0f, 0.0f);
+    vec3 high = vec3(1.0f, 1.0f, 1.0f);
+    r = cm_trilinear_along(cm_cell_corners(cell), clamp(from + t * f.d, low, high), clamp(from + t_1 * f.d, low, high));
+    // What remains of the fit is its change since mid-shutter.
+    fit -= cm_record_fit(data);
+  }
+  vec2 density = cm_fit_along(fit, f, shape);
+  r += cm_segment_between(density.x + density.y * t, density.x + density.y * t_1);
+  return max(r, CmBernstein(0.0f));
+}
+#endif
+
 CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1, CM_OUT(CmBernstein) r,
                          CM_OUT(uvec3) next) {
   uvec4 links = cm_record(cell.x, 0u);
@@ -101,7 +137,9 @@ CM_FN void cm_march_step(uvec3 cell, CmMarchRay ray, float t, CM_OUT(float) t_1,
   vec4 faces = cm_face_distances(frame, shape);
   float t_exit = cm_nearest_face(faces);
   t_1 = max(t, t_exit);
-#if CM_LINEAR
+#if CM_CUBIC
+  r = cm_density_along(data, cell.x, frame, shape, t, t_1);
+#elif CM_LINEAR
   vec2 density = cm_fit_along(cm_march_fit(data, cell.x), frame, shape);
   r.x = max(0.0f, density.x + density.y * t);
   r.y = max(0.0f, density.x + density.y * t_1);

@@ -1,21 +1,29 @@
 // Density or extinction along a ray's segment in a cell: a polynomial of the position from 0 at the segment's start to
-// 1 at its end. It is linear, or cubic between the centers of voxels (march_voxel.glsl with CM_LINEAR). CmBernstein has
-// its control points in Bernstein form: the first and the last are the values at both ends, and none is negative.
-// Shared by GLSL and C++.
+// 1 at its end. It is linear, or cubic between the centers of voxels: in march_voxel.glsl with CM_LINEAR, and in
+// march_tet.glsl with CM_LINEAR 2. CmBernstein has its control points in Bernstein form: the first and the last are the
+// values at both ends, and none is negative. Shared by GLSL and C++.
 #ifndef CM_SEGMENT_GLSL
 #define CM_SEGMENT_GLSL
 
 #undef CM_CUBIC
 #undef CmBernstein
+#undef CM_CUBIC_EMISSION
 #ifdef CM_MARCH
-#define CM_CUBIC (CM_MARCH != 0 && CM_LINEAR != 0)
+#define CM_CUBIC (CM_LINEAR == 2 || (CM_MARCH != 0 && CM_LINEAR != 0))
+#define CM_CUBIC_EMISSION (CM_MARCH != 0 && CM_LINEAR != 0)
 #else
 #define CM_CUBIC 0
+#define CM_CUBIC_EMISSION 0
 #endif
 
 #if CM_CUBIC
 #define CmBernstein vec4
 
+// The segment of a linear function, from its values at both ends.
+CM_FN CmBernstein cm_segment_between(float at_0, float at_1) {
+  float third = (at_1 - at_0) * 0.333333333f;
+  return vec4(at_0, at_0 + third, at_1 - third, at_1);
+}
 CM_FN float cm_segment_end(CmBernstein b) { return b.w; }
 CM_FN float cm_segment_mean(CmBernstein b) { return 0.25f * (b.x + b.y + b.z + b.w); }
 CM_FN CmBernstein cm_segment_reversed(CmBernstein b) { return vec4(b.w, b.z, b.y, b.x); }

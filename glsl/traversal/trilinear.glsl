@@ -1,5 +1,5 @@
-// Trilinear interpolation between the eight voxels at the corners of a cell, for CM_LINEAR of the voxel grids
-// (docs/architecture/interpolation.md). Shared by GLSL and C++.
+// Trilinear interpolation between the eight voxels at the corners of a cell, for CM_LINEAR of the voxel grids and
+// CM_LINEAR 2 of tetrahedra (docs/architecture/interpolation.md). Shared by GLSL and C++.
 #ifndef CM_TRILINEAR_GLSL
 #define CM_TRILINEAR_GLSL
 

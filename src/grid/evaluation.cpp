@@ -66,7 +66,7 @@ float Measure::bound(float min, float max, float edge_squared, float lit) const 
 
 float Measure::bound_of_steepest(float variance, float left, float lit) const {
   if (criterion_ == Criterion::range_mean) return std::numeric_limits<float>::infinity();
-  return (cells_ == CellKind::constant ? variance : left) * scale_ * seen_squared(lit);
+  return (has_fits(cells_) ? left : variance) * scale_ * seen_squared(lit);
 }
 
 float Measure::squared(std::uint32_t cell_class, float mean, float variance, const vec3& covariance, float min,
@@ -79,7 +79,7 @@ float Measure::squared(std::uint32_t cell_class, float mean, float variance, con
   const float own = 1.0F + own_hiding_ * mean * std::sqrt(edge_squared);
   const float weight = edge_squared * scale_ * seen_squared(lit) / (own * own);
   const float value = variance * weight;
-  if (value <= floor || cells_ == CellKind::constant) return value;
+  if (value <= floor || !has_fits(cells_)) return value;
   const float explained = fit_linear(cell_class, covariance, mean).explained;
   return std::max(0.0F, variance - explained) * weight;
 }

@@ -71,7 +71,7 @@ class Measure {
   /// length. left: the same maximum for the variance that a linear fit leaves.
   [[nodiscard]] float bound_of_steepest(float variance, float left, float lit) const;
   [[nodiscard]] OwnMeasure numbers(float floor) const {
-    return {scale_, own_hiding_, floor, cells_ == CellKind::linear, two_way_, criterion_};
+    return {scale_, own_hiding_, floor, has_fits(cells_), two_way_, criterion_};
   }
   /// covariance: of position and density in the cell's frame, per unit. A result that is not above the floor may be
   /// inexact.

@@ -274,7 +274,7 @@ class GridBuilder::LeafMoments {
 class GridBuilder::LeafDensity {
  public:
   LeafDensity(const Statistics& density, const Channels& channels, CellKind cells, float unit)
-      : linear_(cells == CellKind::linear), to_relative_(1.0 / unit) {
+      : linear_(has_fits(cells)), to_relative_(1.0 / unit) {
     if (channels.ends) {
       fields_.emplace_back(channels.ends->open.statistics());
       fields_.emplace_back(channels.ends->close.statistics());
@@ -316,6 +316,34 @@ class GridBuilder::LeafDensity {
   std::vector<LeafMoments> fields_;  // density, or both shutter ends
   bool linear_;
   double to_relative_;
+};
+
+// Reads the voxels between which the field of a sixth is interpolated, in units of density_unit.
+class GridBuilder::LeafCorners {
+ public:
+  LeafCorners(const Statistics& density, float unit) : density_(&density), to_relative_(1.0F / unit) {}
+  // Returns them as half floats; the order is that of cm_corner_offset (glsl/traversal/trilinear.glsl) in the frame of the sixth.
+  glm::uvec4 operator()(const Node& node, const vec3& centroid) {
+    glm::uvec4 words(0U);
+    if (node.heap < 512) return words;
+    const ivec3 corner = ivec3(centroid) & ~(volume::brick_size - 1);
+    if (corner != corner_) voxels_.look_up(*density_, corner);
+    corner_ = corner;
+    const BrickTree& tree = brick_tree(kuhn_frame(corner, volume::brick_size, node.permutation));
+    const BrickTree::Leaf& leaf = tree.leaf[node.heap - 512U];
+    const auto value = [&](int i) {
+      const int at = leaf.first + (i >> 2) * leaf.step[0] + ((i >> 1) & 1) * leaf.step[1] + (i & 1) * leaf.step[2];
+      return voxels_[at] * to_relative_;
+    };
+    for (int i = 0; i < 4; ++i) words[i] = glm::packHalf2x16({value(2 * i), value(2 * i + 1)});
+    return words;
+  }
+
+ private:
+  const Statistics* density_;
+  float to_relative_;
+  ivec3 corner_{-1};  // of the brick in voxels_
+  BrickVoxels voxels_;
 };
 
 // Sums the voxels of leaves in double precision.
@@ -464,6 +492,8 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     if (row.is_in(channels)) row.resize(grid.channels, count, allocation);
   }
   if (channels.ends) allocation.resize(grid.change, count);
+  const bool has_corners = cells == CellKind::trilinear && statistics_->interpolates();
+  if (has_corners) allocation.resize(grid.corners, count);
   number_nodes(grid, allocation);
 
   struct Box {
@@ -476,6 +506,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
   tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, 8192), [&](const auto& range) {
     LeafDensity density(*statistics_, channels, cells, grid.density_unit);
     LeafChannels beside(*statistics_, fields, cells);
+    LeafCorners corners(*statistics_, grid.density_unit);
     Box& box = boxes.local();
     for (std::uint32_t rank = range.begin(); rank != range.end(); ++rank) {
       const Node& node = nodes_[leaf_nodes_[rank]];
@@ -495,6 +526,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
       }
       grid.cells[rank] = record(leaf_nodes_[rank], of.fit, emits);
       if (channels.ends) grid.change[rank] = pack_fit(of.change);
+      if (has_corners) grid.corners[rank] = corners(node, centroid);
     }
     part.add(range.size());
   });

@@ -59,6 +59,7 @@ class GridBuilder {
   void number_nodes(TetGrid& grid, ProgressPart& part) const;
   class LeafMoments;
   class LeafDensity;
+  class LeafCorners;
   class LeafVoxels;
   class LeafChannels;
   // fit: mean and gradient, in units of the grid's density_unit.

@@ -43,7 +43,7 @@ bool before(const uvec2& a, const uvec2& b) {
 uvec2 coefficients_of(const Moments& m, const vec3& v0, std::uint32_t shape, CellKind cells, double to_relative) {
   const double mean = std::clamp(m.mean(), double(m.min), double(m.max));
   vec3 gradient(0.0F);
-  if (cells == CellKind::linear && m.min < m.max) {
+  if (has_fits(cells) && m.min < m.max) {
     gradient = fit_linear(core::cm_shape_class(shape), frame_covariance(m, shape, centroid_of(v0, shape)),
                           static_cast<float>(mean))
                    .gradient *

@@ -80,6 +80,10 @@ struct Lattice {
   [[nodiscard]] std::size_t brick_voxels() const {
     return cube.interpolation == Interpolation::linear ? BrickCorners().size() : volume::brick_voxels;
   }
+  /// Whether its grids have TetGrid::corners.
+  [[nodiscard]] bool has_corners() const {
+    return cells == CellKind::trilinear && cube.interpolation == Interpolation::linear;
+  }
   [[nodiscard]] std::uint32_t top_scale() const { return static_cast<std::uint32_t>(cube.log2_size) / 3; }
   /// Main memory in bytes, without the volume's.
   [[nodiscard]] std::uint64_t bytes() const {

@@ -20,7 +20,10 @@ namespace cumulet::grid {
 ///    thin media this equals deviation. Emission has one-way transmittance: 1.2 T s e, divided by the mean depth of the
 ///    strongest component, or of the luminance.
 enum class Criterion { deviation = 0, range_mean = 1, transmittance = 2 };
-enum class CellKind { linear, constant };
+/// Density in a cell: its linear fit, or its mean. Trilinear: the linear fit, and in sixths of cells of eight voxels
+/// the interpolated field itself; without interpolation between voxels as linear.
+enum class CellKind { linear, constant, trilinear };
+constexpr bool has_fits(CellKind cells) { return cells != CellKind::constant; }
 
 /// A pinhole camera for adaptive refinement, in world space.
 struct RefineCamera {

@@ -55,7 +55,7 @@ EmissionRecord emission_record(const std::array<Moments, 3>& moments, std::uint3
     const Moments& m = moments[static_cast<std::size_t>(i)];
     record.mean[i] = static_cast<float>(std::clamp(m.mean(), double(m.min), double(m.max)));
     sum += record.mean[i];
-    if (cells == CellKind::linear && m.min < m.max)
+    if (has_fits(cells) && m.min < m.max)
       slope += fit_linear(core::cm_shape_class(shape), frame_covariance(m, shape, centroid), record.mean[i]).gradient;
   }
   if (sum > 0.0F) record.gradient = pack_emission_gradient(slope / sum);

@@ -69,12 +69,16 @@ struct TetGrid {
   /// One per cell, packed as pack_fit(): half of the change of mean and gradient from shutter open to close. The record
   /// has the value halfway between. Empty if nothing changes.
   std::vector<glm::uvec2> change;
+  /// Per cell: the density between voxels in a sixth of a cell of eight voxels, as eight half floats (CellCorners); 0
+  /// in larger cells. Empty unless the cells are trilinear.
+  std::vector<glm::uvec4> corners;
   glm::vec3 content_min{0.0F};  ///< cube-space bounds of all cells with density or emission
   glm::vec3 content_max{0.0F};
   bool limited = false;  ///< max_cells ended the refinement
 
   [[nodiscard]] std::uint64_t bytes() const {
-    return cells.size() * sizeof(CellRecord) + channels.bytes() + change.size() * 8 + tree.size() * 4 + 200;
+    return cells.size() * sizeof(CellRecord) + channels.bytes() + change.size() * 8 + corners.size() * 16 +
+           tree.size() * 4 + 200;
   }
 };
 

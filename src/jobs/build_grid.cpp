@@ -44,6 +44,11 @@ double density_scale_in(double unit, const volume::ScalarVolume& voxels, const g
 
 bool interpolates(const BuildSettings& settings) { return settings.interpolation == grid::Interpolation::linear; }
 
+// Whether tetrahedra have grid::TetGrid::corners.
+bool has_corners(const BuildSettings& settings) {
+  return settings.refine.cells == grid::CellKind::trilinear && interpolates(settings);
+}
+
 // Returns whether the GPU builds a tetrahedral grid; logs the reason if the CPU builds it instead.
 bool builds_on_gpu(const Log& log, const VolumeAsset& volume, const BuildSettings& settings, bool moves) {
   if (settings.on != BuildOn::gpu) return false;
@@ -101,7 +106,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     return built;
   }
   const bool on_gpu = builds_on_gpu(log, *volume, settings, moving != nullptr);
-  const Carried carried = Carried::of(channels);
+  const Carried carried = Carried::of(channels, has_corners(settings));
   const std::uint64_t max_cells = settings.refine.max_cells;
   grid::RefineSettings refine = settings.refine;
   refine.density_scale = density_scale_in(unit, *voxels, statistics->cube(), settings.refine.density_scale);
@@ -146,8 +151,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   built.levels = grid->levels;
   built.limited = grid->limited;
   if (grid->limited) log_limited(log, refine.max_cells, max_cells);
-  built.source = finished(
-      scene::make_tet_source(std::move(grid), settings.refine.cells == grid::CellKind::linear, max_value, &progress));
+  built.source =
+      finished(scene::make_tet_source(std::move(grid), grid::has_fits(settings.refine.cells), max_value, &progress));
   resource_limits.require(built.bytes(), volume->name());
   return built;
 }

@@ -19,6 +19,7 @@ std::uint64_t bytes_per_cell(const Carried& carried) {
   }
   if (emits(carried)) bytes += sizeof(scene::GlowingCell);
   if (carried.change) bytes += sizeof(glm::uvec2);
+  if (carried.corners) bytes += sizeof(glm::uvec4);
   return bytes;
 }
 
@@ -38,15 +39,15 @@ std::uint64_t fit_in_gl(const Carried& carried, const ResourceLimits& resource_l
 
 }  // namespace
 
-Carried Carried::of(const grid::Channels& channels) {
-  Carried carried{.change = channels.ends != nullptr};
+Carried Carried::of(const grid::Channels& channels, bool corners) {
+  Carried carried{.change = channels.ends != nullptr, .corners = corners};
   for (const grid::ChannelRow& row : grid::channel_table)
     carried.channels[grid::index_of(row.channel)] = row.is_in(channels);
   return carried;
 }
 
 Carried Carried::of(const scene::MarchSource& source) {
-  Carried carried{.change = source.changes()};
+  Carried carried{.change = source.changes(), .corners = source.trilinear};
   for (const grid::ChannelRow& row : grid::channel_table)
     carried.channels[grid::index_of(row.channel)] = source.has(row.channel);
   return carried;

@@ -20,8 +20,9 @@ inline constexpr std::uint64_t fewest_cells = 24;
 struct Carried {
   std::array<bool, grid::channel_table.size()> channels{};
   bool change = false;
+  bool corners = false;  ///< grid::TetGrid::corners
 
-  static Carried of(const grid::Channels& channels);
+  static Carried of(const grid::Channels& channels, bool corners);
   /// For a tetrahedral source.
   static Carried of(const scene::MarchSource& source);
 };

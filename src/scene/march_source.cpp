@@ -107,6 +107,7 @@ MarchSource make_tet_source(std::shared_ptr<const grid::TetGrid> grid, bool line
   source.cube = grid->cube;
   source.max_value = max_value;
   source.emissive = emissive_table(*grid, progress);
+  source.trilinear = !grid->corners.empty();
   source.grid = std::move(grid);
   source.linear = linear;
   return source;
@@ -118,7 +119,8 @@ MarchSource make_planned_source(GridPlan plan, std::shared_ptr<const volume::Sca
   source.cube = statistics->cube();
   source.channels = std::move(channels);
   source.max_value = volume->max_value;
-  source.linear = plan.lattice->cells == grid::CellKind::linear;
+  source.linear = grid::has_fits(plan.lattice->cells);
+  source.trilinear = plan.lattice->has_corners();
   source.plan = std::make_shared<const GridPlan>(std::move(plan));
   source.volume = std::move(volume);
   source.statistics = std::move(statistics);

@@ -36,6 +36,7 @@ struct MarchSource {
   std::shared_ptr<const grid::TetGrid> grid;
   GridPlanPtr plan;
   bool linear = false;     // tet: density is linear in a cell; dense, brick: interpolated between voxels
+  bool trilinear = false;  // tet: in sixths of cells it is interpolated between voxels (grid::TetGrid::corners)
   EmissiveTable emissive;  // of the grid; if GL builds the grid, it is known only after the build
   // dense: GL reads from these; brick: packed by make_voxel_source
   std::shared_ptr<const volume::ScalarVolume> volume;
@@ -50,7 +51,7 @@ struct MarchSource {
 
   /// Whether both can be rendered in one scene.
   [[nodiscard]] bool goes_with(const MarchSource& other) const {
-    return march == other.march && linear == other.linear;
+    return march == other.march && linear == other.linear && trilinear == other.trilinear;
   }
   /// dense: number of voxels that the cells of the box use, along each axis.
   [[nodiscard]] glm::ivec3 voxel_count() const { return box_size + (linear ? 1 : 0); }

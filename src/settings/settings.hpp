@@ -19,7 +19,10 @@ inline constexpr std::array grid_type_choices = {
     Choice{"bricks", CUMULET_GRID_BRICKS, "Bricks", "Voxels, with empty 8x8x8 bricks skipped.", "brick"}};
 inline constexpr std::array cells_choices = {
     Choice{"constant", CUMULET_CELLS_CONSTANT, "Constant", "One density per cell: the mean."},
-    Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."}};
+    Choice{"linear", CUMULET_CELLS_LINEAR, "Linear", "A least-squares fit: fewer cells for the same error."},
+    Choice{"trilinear", CUMULET_CELLS_TRILINEAR, "Trilinear",
+           "With linear interpolation: a fit, and in the finest cells the interpolated density itself, without edges "
+           "in close views."}};
 inline constexpr std::array voxel_interpolation_choices = {
     Choice{"auto", CUMULET_INTERPOLATION_AUTO, "Automatic", "Linear; nearest for dynamic volumes in GPU memory."},
     Choice{"nearest", CUMULET_INTERPOLATION_NEAREST, "Nearest", "A voxel is a cube of constant value."},
@@ -417,9 +420,10 @@ struct Table<cumulet_grid_desc> {
                 .tip = "The grid that rays traverse (key M)."}}),
       Setting(&Desc::cells, {.name = "cells", .choices = cells_choices,
         .key = "grid.cells", .flag = "--cells",
-        .help = "Density in a tetrahedron: constant or linear (default: linear)",
+        .help = "Density in a tetrahedron: constant, linear, or for close views with --interpolation linear trilinear "
+                "in the finest ones (default: linear)",
         .row = {.label = "Cells",
-                .tip = "Density in a tetrahedron: constant or linear."}}),
+                .tip = "Density in a tetrahedron: constant, linear, or trilinear in the finest ones."}}),
       Setting(&Desc::criterion, {.name = "criterion", .choices = criterion_choices,
         .key = "grid.criterion", .flag = "--criterion",
         .help = "Refinement criterion (default: transmittance; if only --threshold is given, deviation)",

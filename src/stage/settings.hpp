@@ -25,6 +25,13 @@ static_assert(static_cast<int>(grid::Criterion::transmittance) == CUMULET_CRITER
 
 static_assert(static_cast<int>(BuildOn::gpu) == CUMULET_BUILD_GPU);
 
+// Trilinear cells need interpolation between voxels.
+inline grid::CellKind cells_of(cumulet_cell_density cells, grid::Interpolation interpolation) {
+  if (cells == CUMULET_CELLS_CONSTANT) return grid::CellKind::constant;
+  const bool trilinear = cells == CUMULET_CELLS_TRILINEAR && interpolation == grid::Interpolation::linear;
+  return trilinear ? grid::CellKind::trilinear : grid::CellKind::linear;
+}
+
 struct GridSettings {
   BuildSettings build;  // refine.camera is filled in from the viewer's camera
   bool camera_adaptive = false;
@@ -42,7 +49,7 @@ struct GridSettings {
     const bool automatic = d.interpolation == CUMULET_INTERPOLATION_AUTO;
     s.interpolation_in_gl = automatic && may_stay_in_gl ? grid::Interpolation::nearest : s.build.interpolation;
     grid::RefineSettings& refine = s.build.refine;
-    refine.cells = d.cells == CUMULET_CELLS_LINEAR ? grid::CellKind::linear : grid::CellKind::constant;
+    refine.cells = cells_of(d.cells, s.build.interpolation);
     const cumulet_refinement_criterion criterion = settings::criterion_of(d);
     refine.criterion = static_cast<grid::Criterion>(criterion);
     refine.threshold = d.threshold != 0.0 ? d.threshold : settings::default_threshold(criterion);

@@ -697,9 +697,12 @@ void VolumeStage::keep_to_one_march(std::vector<scene::Volume>& volumes,
   const auto fits = [&](const scene::Volume& volume) {
     if (building && !before.empty()) return volume.source->goes_with(*before.front().source);
     const bool linear = grid_.build.march == scene::March::tet
-                            ? grid_.build.refine.cells == grid::CellKind::linear
+                            ? grid::has_fits(grid_.build.refine.cells)
                             : grid_.build.interpolation == grid::Interpolation::linear;
-    return volume.source->march == grid_.build.march && volume.source->linear == linear;
+    const bool trilinear =
+        grid_.build.march == scene::March::tet && grid_.build.refine.cells == grid::CellKind::trilinear;
+    return volume.source->march == grid_.build.march && volume.source->linear == linear &&
+           volume.source->trilinear == trilinear;
   };
   for (scene::Volume& volume : volumes) {
     if (fits(volume)) continue;

@@ -52,7 +52,7 @@ class Random {
 };
 
 struct Sizes {
-  std::size_t cells = 0, emission = 0, glowing = 0, color = 0, anisotropy = 0, velocity = 0, tree = 1;
+  std::size_t cells = 0, emission = 0, glowing = 0, color = 0, anisotropy = 0, velocity = 0, tree = 1, corners = 0;
 };
 
 MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
@@ -64,19 +64,22 @@ MarchSourcePtr source_of(const Sizes& sizes, unsigned seed) {
   grid->channels.anisotropy = random.records<std::int16_t>(sizes.anisotropy);
   grid->channels.velocity = random.records<glm::uvec2>(sizes.velocity);
   grid->tree = random.records<std::uint32_t>(sizes.tree);
+  grid->corners = random.records<uvec4>(sizes.corners);
   for (grid::RootEntry& root : grid->roots) root = {random(), random()};
   grid->levels = seed;
   grid->content_min = glm::vec3(static_cast<float>(seed));
   grid->content_max = grid->content_min + 5.0F;
   auto source = std::make_shared<scene::MarchSource>();
   source->emissive.cells = random.records<scene::GlowingCell>(sizes.glowing);
+  source->trilinear = !grid->corners.empty();
   source->grid = std::move(grid);
   source->linear = true;
   return source;
 }
 
 // A grid's cells, channels, tree and roots as shaders read them, in the order of `kinds`.
-constexpr std::array kinds{"records", "emission", "glow", "colour", "anisotropy", "velocity", "tree", "roots"};
+constexpr std::array kinds{"records",  "emission", "glow",  "colour", "anisotropy",
+                           "velocity", "tree",     "roots", "corners"};
 std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
   const grid::TetGrid& grid = *source->grid;
   std::array<Words, kinds.size()> words;
@@ -94,6 +97,7 @@ std::array<Words, kinds.size()> expected_of(const MarchSourcePtr& source) {
   for (const glm::uvec2& halves : grid.channels.velocity) words[5].emplace_back(halves, 0, 0);
   for (const std::uint32_t word : grid.tree) words[6].emplace_back(word, 0, 0, 0);
   for (const grid::RootEntry& root : grid.roots) words[7].emplace_back(root.first_leaf, root.first_internal, 0, 0);
+  words[8] = grid.corners;
   return words;
 }
 
@@ -134,7 +138,8 @@ class GridSetUploads : public test::GlTest {
         "uvec4((cm_anisotropy_record(i) >> (16u * (i & 1u))) & 65535u, 0u, 0u, 0u)",
         "uvec4(cm_velocity_record(i), 0u, 0u)",
         "uvec4(cm_tree(i), 0u, 0u, 0u)",
-        "uvec4(cm_root_leaf(i), cm_root_node(i), 0u, 0u)"};
+        "uvec4(cm_root_leaf(i), cm_root_node(i), 0u, 0u)",
+        "cm_corners_record(i)"};
     text += "layout(std430, binding = 0) buffer Words { uvec4 words[]; };\nvoid main() {\n";
     text += "  uint i = gl_GlobalInvocationID.x;\n  if (i < uint(words.length())) words[i] = ";
     text += std::string(values[kind]) + ";\n}\n";
@@ -227,6 +232,22 @@ TEST_P(GridSetUploads, ReplacingUploadsOnlyNewGrids) {
       expect_whole(moved, {plain_, glowing_, other_}, what + ", moved");
     }
   }
+}
+
+TEST_P(GridSetUploads, ShadersReadTheCornersOfTrilinearCells) {
+  const MarchSourcePtr first = source_of({.cells = 1900, .tree = 301, .corners = 1900}, 6);
+  const MarchSourcePtr second = source_of(
+      {.cells = 301, .emission = 301, .glowing = 31, .color = 301, .anisotropy = 301, .velocity = 301, .corners = 301},
+      7);
+  const MarchSourcePtr third = source_of({.cells = 333, .corners = 333}, 8);
+  const MarchData data = upload({first, second}, one_page);
+  EXPECT_EQ(render::grid_macros(render::grid_features(data, false)),
+            (std::vector<std::string>{"CM_MARCH 0", "CM_LINEAR 2", "CM_PAGES 6"}));
+  expect_whole(data, {first, second}, "two grids");
+  const MarchData after = upload({third, second}, one_page, &data);
+  expect_whole(after, {third, second}, "another first grid");
+  EXPECT_EQ(bytes_of(third), 333U * (32 + 16) + 4 + 52 * 4);
+  EXPECT_THROW(upload({first, plain_}, one_page), Error) << "kernels for fits do not read corners";
 }
 
 // A set of one grid is laid out as a grid without sets, except for its roots.

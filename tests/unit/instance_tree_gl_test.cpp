@@ -116,6 +116,7 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(grid.glowing),
                                    CM_RECORD(grid.moves),
                                    CM_RECORD(grid.first_change),
+                                   CM_RECORD(grid.first_corners),
                                    CM_RECORD(emissive.density),
                                    CM_RECORD(emissive.extent),
                                    CM_RECORD(emissive.min_stretch),

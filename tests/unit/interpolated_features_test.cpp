@@ -129,33 +129,37 @@ class InterpolatedFeatures : public CViewerTest {
     look(v_, stand);
     ASSERT_EQ(cumulet_set_volume(v_, layers_.get()), CUMULET_OK);
   }
-  void show(double scale, cumulet_grid_type type, cumulet_interpolation interpolation, cumulet_build_device device) {
+  struct Kind {
+    cumulet_grid_type type;
+    cumulet_build_device device = CUMULET_BUILD_CPU;
+    cumulet_cell_density cells = CUMULET_CELLS_LINEAR;
+  };
+  void show(double scale, const Kind& kind, cumulet_interpolation interpolation) {
     auto medium = make_desc<cumulet_medium_desc>();
     medium.density_scale = scale;
     ASSERT_EQ(cumulet_set_medium(v_, &medium), CUMULET_OK);
     auto grid = make_desc<cumulet_grid_desc>();
-    grid.type = type;
+    grid.type = kind.type;
+    grid.cells = kind.cells;
     grid.threshold = -1.0;
     grid.interpolation = interpolation;
-    grid.build_device = device;
+    grid.build_device = kind.device;
     ASSERT_EQ(cumulet_set_grid(v_, &grid), CUMULET_OK);
     make();
   }
   // Calls visit for every grid type, interpolation and density scale, with the expected values. part: the error of
   // cells, whose velocity is constant.
   void for_each(const std::function<void(const Layers& expected, double part)>& visit) {
-    struct Kind {
-      cumulet_grid_type type;
-      cumulet_build_device device;
-    };
-    for (const Kind& kind :
-         {Kind{CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_CPU}, Kind{CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_GPU},
-          Kind{CUMULET_GRID_DENSE, CUMULET_BUILD_CPU}, Kind{CUMULET_GRID_BRICKS, CUMULET_BUILD_CPU}}) {
+    for (const Kind& kind : {Kind{CUMULET_GRID_TETRAHEDRAL}, Kind{CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_GPU},
+                             Kind{CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_CPU, CUMULET_CELLS_TRILINEAR},
+                             Kind{CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_GPU, CUMULET_CELLS_TRILINEAR},
+                             Kind{CUMULET_GRID_DENSE}, Kind{CUMULET_GRID_BRICKS}}) {
       for (const cumulet_interpolation interpolation : {CUMULET_INTERPOLATION_NEAREST, CUMULET_INTERPOLATION_LINEAR}) {
         for (const double scale : {1.2, 8.0}) {
-          SCOPED_TRACE(std::to_string(kind.type) + " built by " + std::to_string(kind.device) + ", interpolation " +
-                       std::to_string(interpolation) + ", density scale " + std::to_string(scale));
-          show(scale, kind.type, interpolation, kind.device);
+          SCOPED_TRACE(std::to_string(kind.type) + " built by " + std::to_string(kind.device) + ", cells " +
+                       std::to_string(kind.cells) + ", interpolation " + std::to_string(interpolation) +
+                       ", density scale " + std::to_string(scale));
+          show(scale, kind, interpolation);
           visit({scale, interpolation}, kind.type == CUMULET_GRID_TETRAHEDRAL ? 0.8 : 0.0);
         }
       }

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "support/gl_viewer.hpp"
 #include "support/interpolated.hpp"
@@ -27,6 +29,9 @@ viewer::GridSettings between(const test::MarchKind& kind) {
   return settings;
 }
 
+/// In which the finest cells have the interpolated field itself.
+constexpr test::MarchKind trilinear{render::March::tet, grid::CellKind::trilinear};
+
 /// A camera that looks along -z at a point of the plane z = 0, at so small an angle that its rays are alike.
 viewer::CameraPose along_z(double x, double y) { return test::camera_at({x, y, 400.0}, {x, y, 0.0}, 0.001); }
 
@@ -37,7 +42,7 @@ TEST_P(InterpolatedImage, OpacityMatchesTheOpticalDepth) {
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});
   viewer->set_medium({0.2, vec3(0.0F), {}});
   const double through = std::exp(-0.2 * 0.25 * 28.0);
-  for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2], test::march_kinds[3]}) {
+  for (const test::MarchKind& kind : {trilinear, test::march_kinds[0], test::march_kinds[2], test::march_kinds[3]}) {
     viewer->set_grid(between(kind));
     viewer->set_camera(along_z(30.3, 31.8));
     const test::Picture seen = test::render(*viewer, {8, 8, 1, 1, render::View::density});
@@ -52,7 +57,7 @@ TEST_P(InterpolatedImage, AVoxelFallsToZeroOverAVoxel) {
   const auto viewer = make();
   viewer->set_volume(test::make_volume({1, 1, 1}, ivec3(7, 8, 15), [](const ivec3&) { return 1.0F; }));
   viewer->set_medium({1.0, vec3(0.0F), {}});
-  for (const test::MarchKind& kind : {test::march_kinds[2], test::march_kinds[3]}) {
+  for (const test::MarchKind& kind : {trilinear, test::march_kinds[2], test::march_kinds[3]}) {
     viewer->set_grid(between(kind));
     for (const double x : {6.1, 6.5, 7.0, 7.75}) {
       for (const double y : {7.5, 8.0, 8.9}) {
@@ -106,7 +111,7 @@ TEST_P(InterpolatedImage, ColorsAreWeightedByDensity) {
   medium.density_scale = 0.05;
   medium.max_bounces = 1;
   viewer->set_medium(medium);
-  for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2], test::march_kinds[3]}) {
+  for (const test::MarchKind& kind : {trilinear, test::march_kinds[0], test::march_kinds[2], test::march_kinds[3]}) {
     viewer->set_grid(between(kind));
     const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
     const glm::dvec4 mean = picture.mean();
@@ -116,6 +121,29 @@ TEST_P(InterpolatedImage, ColorsAreWeightedByDensity) {
     EXPECT_NEAR((mean.y - through) / red, 0.5, 0.05);
     EXPECT_NEAR((mean.z - through) / red, 0.25, 0.05);
   }
+}
+
+// Linear fits differ at the faces of cells, the interpolated field does not: trilinear cells are as exact as bricks.
+TEST_P(InterpolatedImage, TrilinearCellsShowWhatBricksShow) {
+  const auto viewer = make();
+  viewer->set_volume(test::noise_volume({20, 18, 22}, ivec3(0), 5));
+  viewer->set_medium({0.5, vec3(0.0F), {}});
+  viewer->set_camera(test::camera_at({10.3, 8.1, 60.0}, {10.3, 8.1, 10.0}, 5.0));
+  const auto opacities = [&](const test::MarchKind& kind, viewer::BuildOn on) {
+    viewer::GridSettings settings = between(kind);
+    settings.build.on = on;
+    viewer->set_grid(settings);
+    return test::render(*viewer, {32, 32, 1, 1, render::View::density}).pixels;
+  };
+  const auto expected = opacities(test::march_kinds[3], viewer::BuildOn::cpu);
+  const auto farthest = [&](const std::vector<glm::vec4>& pixels) {
+    float most = 0.0F;
+    for (std::size_t i = 0; i < pixels.size(); ++i) most = std::max(most, std::abs(pixels[i].w - expected[i].w));
+    return most;
+  };
+  EXPECT_GT(farthest(opacities(test::march_kinds[0], viewer::BuildOn::cpu)), 4e-3F);
+  EXPECT_LT(farthest(opacities(trilinear, viewer::BuildOn::cpu)), 5e-4F);
+  EXPECT_LT(farthest(opacities(trilinear, viewer::BuildOn::gpu)), 5e-4F);
 }
 
 TEST_P(InterpolatedImage, ChangesWithTheSetting) {

@@ -45,6 +45,14 @@ struct CpuBricksBetween {
 };
 #undef CM_MARCH
 #undef CM_LINEAR
+#define CM_MARCH 0
+#define CM_LINEAR 2
+struct CpuTetBetween : CpuTetData {
+  uvec4 cm_corners_record(uint cell) const { return grid->corners.at(cell); }
+#include "support/traced.inc"
+};
+#undef CM_MARCH
+#undef CM_LINEAR
 
 }  // namespace cumulet::core
 
@@ -375,6 +383,49 @@ TEST(InterpolatedTetrahedra, MatchQuadratureOfASmoothField) {
     worst = std::max(worst, std::abs(double{volume.max_value} * depth - expected) / (expected + 0.1));
   }
   EXPECT_LT(worst, 5e-3);
+}
+
+/// A grid that is refined down to sixths of cells.
+grid::TetGrid full_grid(const volume::ScalarVolume& volume, grid::Interpolation interpolation, grid::CellKind cells) {
+  grid::RefineSettings settings;
+  settings.threshold = -1.0;
+  settings.cells = cells;
+  return test::GridReference(volume, grid::fit_cube(volume, interpolation)).grid(settings);
+}
+
+TEST(InterpolatedTetrahedra, TrilinearCellsMatchQuadrature) {
+  unsigned seed = 20;
+  volume::ScalarVolume mixed = mixed_volume();
+  mixed.max_value = 5.0F;
+  mixed.active_voxels = 1;
+  for (const volume::ScalarVolume& volume : {test::noise_volume({20, 18, 22}, ivec3(-3, 2, 5), 3), mixed}) {
+    const grid::TetGrid grid = full_grid(volume, linear, grid::CellKind::trilinear);
+    core::CpuTetBetween tracer;
+    show_box(tracer, grid.content_min, grid.content_max, grid.cube);
+    tracer.grid = &grid;
+    expect_exact(tracer, volume, grid.cube, seed++);
+  }
+}
+
+TEST(InterpolatedTetrahedra, OnlyTrilinearCellsBetweenVoxelsHaveCorners) {
+  const auto volume = test::noise_volume({20, 18, 22}, ivec3(-3, 2, 5), 3);
+  const grid::TetGrid linear_fits = full_grid(volume, linear, grid::CellKind::linear);
+  const grid::TetGrid trilinear = full_grid(volume, linear, grid::CellKind::trilinear);
+  EXPECT_TRUE(linear_fits.corners.empty());
+  EXPECT_TRUE(full_grid(volume, grid::Interpolation::nearest, grid::CellKind::trilinear).corners.empty());
+  ASSERT_EQ(trilinear.corners.size(), trilinear.cells.size());
+  EXPECT_EQ(trilinear.bytes(), linear_fits.bytes() + 16 * trilinear.cells.size());
+  std::size_t sixths = 0;
+  for (std::size_t i = 0; i < trilinear.cells.size(); ++i) {
+    ASSERT_EQ(trilinear.cells[i].data, linear_fits.cells[i].data) << "the fits stay";
+    const std::uint32_t shape = core::cm_record_shape(trilinear.cells[i].data);
+    if (core::cm_shape_class(shape) == 1 && core::cm_shape_exponent(shape) == 0) {
+      ++sixths;
+    } else {
+      ASSERT_EQ(trilinear.corners[i], glm::uvec4(0U));
+    }
+  }
+  EXPECT_GT(sixths, 10000U);
 }
 
 TEST(InterpolatedVolume, IsMadeOnceAndSharesTheVoxels) {

@@ -234,8 +234,11 @@ TEST_F(Limits, MemoryLimitHoldsForVoxelGrids) {
 }
 
 // Refines to the voxels: so many cells that a page of the heap is small in comparison.
-void split_to_the_voxel(const ViewerPtr& viewer, cumulet_build_device build) {
+void split_to_the_voxel(const ViewerPtr& viewer, cumulet_build_device build,
+                        cumulet_cell_density cells = CUMULET_CELLS_LINEAR) {
   auto grid = make_desc<cumulet_grid_desc>();
+  grid.cells = cells;
+  if (cells == CUMULET_CELLS_TRILINEAR) grid.interpolation = CUMULET_INTERPOLATION_LINEAR;
   grid.threshold = -1.0;
   grid.build_device = build;
   ASSERT_EQ(cumulet_set_grid(viewer.get(), &grid), CUMULET_OK);
@@ -289,13 +292,17 @@ TEST_F(Limits, CellCountFollowsTheGpuMemoryLimit) {
   for (const cumulet_build_device build : {CUMULET_BUILD_CPU, CUMULET_BUILD_GPU}) {
     SCOPED_TRACE(build == CUMULET_BUILD_GPU ? "by GL" : "by the CPU");
     const ViewerPtr viewer = make_viewer({.get_proc = Context::get_proc, .user = &context_, .samples = 1});
-    split_to_the_voxel(viewer, build);
-    picture_of(viewer.get(), ball.get(), target_);
-    const cumulet_stats all = stats_of(viewer);
-    ASSERT_EQ(all.limited, 0);
-    expect_cut(viewer, all, 10);
-    limit(viewer, 0, 0);
-    EXPECT_EQ(settle(viewer).cells, all.cells);
+    for (const cumulet_cell_density cells : {CUMULET_CELLS_LINEAR, CUMULET_CELLS_TRILINEAR}) {
+      split_to_the_voxel(viewer, build, cells);
+      picture_of(viewer.get(), ball.get(), target_);
+      const cumulet_stats all = stats_of(viewer);
+      ASSERT_EQ(all.limited, 0);
+      const std::uint64_t bytes_per_cell = cells == CUMULET_CELLS_TRILINEAR ? 52 : 36;
+      EXPECT_NEAR(static_cast<double>(all.cell_bytes), static_cast<double>(bytes_per_cell * all.cells), 512.0);
+      expect_cut(viewer, all, 10);
+      limit(viewer, 0, 0);
+      EXPECT_EQ(settle(viewer).cells, all.cells);
+    }
   }
 }
 

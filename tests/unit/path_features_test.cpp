@@ -95,6 +95,9 @@ TEST(PathFeatures, NeedOnlyDeclaredVariantsForEachGrid) {
     grids.push_back({March::tet, linear, 6, true, false});
     for (const bool wide : {false, true}) grids.push_back({March::tet, linear, 6, wide, true});
   }
+  for (const bool wide : {false, true}) {
+    for (const bool several : {false, true}) grids.push_back({March::tet, true, 6, wide, several, true});
+  }
   for (const March march : {March::dense, March::brick}) {
     for (const bool linear : {false, true}) {
       for (const bool several : {false, true}) grids.push_back({march, linear, 1, false, several});
@@ -127,6 +130,8 @@ TEST(PathFeatures, PlainPathsHaveNoGroundAndNoDisk) {
 TEST(PathFeatures, MacrosOfAGridHaveOneOrder) {
   EXPECT_EQ(grid_macros({March::tet, true, 6, true, true}, true),
             (Macros{"CM_MARCH 0", "CM_LINEAR 1", "CM_PAGES 6", "CM_INSTANCES 1", "CM_MOTION 1", "CM_WIDE 1"}));
+  EXPECT_EQ(grid_macros({March::tet, true, 6, false, false, true}),
+            (Macros{"CM_MARCH 0", "CM_LINEAR 2", "CM_PAGES 6"}));
   EXPECT_EQ(grid_macros({March::brick, false, 1, false, false}), (Macros{"CM_MARCH 2", "CM_LINEAR 0", "CM_PAGES 1"}));
 }
 

@@ -61,6 +61,7 @@ const std::array fields{
     CM_FIELD(grid, glowing),
     CM_FIELD(grid, moves),
     CM_FIELD(grid, first_change),
+    CM_FIELD(grid, first_corners),
     CM_FIELD(emissive, density),
     CM_FIELD(emissive, extent),
     CM_FIELD(emissive, min_stretch),

@@ -64,12 +64,13 @@ GridFeatures grid_features(const MarchData& data, bool several) {
   const bool wide = data.is_wide();
   // The page count is one, two or the maximum, to limit the number of programs.
   std::size_t pages = std::max<std::size_t>(data.pages(), 1);
-  if (pages > 2 || wide || (several && data.march() == March::tet)) pages = MarchData::max_pages;
-  return {data.march(), data.is_linear(), pages, wide, several};
+  if (pages > 2 || wide || data.is_trilinear() || (several && data.march() == March::tet)) pages = MarchData::max_pages;
+  return {data.march(), data.is_linear(), pages, wide, several, data.is_trilinear()};
 }
 
 std::vector<std::string> grid_macros(const GridFeatures& grid, bool motion) {
-  Macros all{macros::march(grid.march), macros::linear(grid.linear), macros::pages(grid.pages)};
+  const int degree = grid.trilinear ? 2 : static_cast<int>(grid.linear);
+  Macros all{macros::march(grid.march), macros::linear(degree), macros::pages(grid.pages)};
   if (grid.several) all.push_back(macros::instances(1));
   if (motion) all.push_back(macros::motion(1));
   if (grid.wide) all.push_back(macros::wide(1));

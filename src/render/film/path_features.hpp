@@ -26,10 +26,11 @@ enum class PathTriangles {
 /// The properties of volume data that decide which programs traverse it.
 struct GridFeatures {
   scene::March march = scene::March::tet;
-  bool linear = false;    // density varies in cells: linear in tetrahedra, trilinear between voxels; else constant
-  std::size_t pages = 1;  // of cell records, as the programs have them: one, two or MarchData::max_pages
-  bool wide = false;      // cells have the wide format
-  bool several = false;   // several volumes
+  bool linear = false;     // density varies in cells: linear in tetrahedra, trilinear between voxels; else constant
+  std::size_t pages = 1;   // of cell records, as the programs have them: one, two or MarchData::max_pages
+  bool wide = false;       // cells have the wide format
+  bool several = false;    // several volumes
+  bool trilinear = false;  // density is trilinear in the finest tetrahedra
 };
 
 /// several: the volumes have an instance table (InstanceData).

@@ -8,6 +8,7 @@ std::uint64_t BuiltGrid::bytes() const {
   for (const grid::ChannelRow& row : grid::channel_table) {
     if (channels[grid::index_of(row.channel)]) bytes += grid::channel_bytes(row.channel, count);
   }
+  if (corners) bytes += std::uint64_t{count} * sizeof(glm::uvec4);
   return bytes;
 }
 

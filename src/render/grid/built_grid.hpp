@@ -23,6 +23,7 @@ struct BuiltGrid {
   gl::Object tree;   ///< 26 grid::RootEntry, of which the last is padding, then TetGrid::tree
   /// Records as in TetGrid, indexed by grid::Channel; null: there is no such channel.
   std::array<gl::Object, grid::channel_table.size()> channels;
+  gl::Object corners;             ///< TetGrid::corners, undefined for larger cells; null: none
   scene::EmissiveTable emissive;  ///< in main memory
   /// Set instead of the buffers if the GPU could not build it; why_not then gives the reason.
   std::shared_ptr<const grid::TetGrid> grid;

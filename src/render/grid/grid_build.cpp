@@ -40,9 +40,10 @@ std::vector<scene::GlowingCell> in_order(std::span<const std::uint32_t> words) {
 }
 
 gl::ProgramKey lattice_key(int stage) { return {"grid_lattice.comp", {gl::macros::stage(stage)}}; }
-// A program for the interpolation of the lattice's values.
-gl::ProgramKey key_between(const grid::Lattice& lattice, gl::ProgramKey key) {
-  if (lattice.cube.interpolation == grid::Interpolation::linear) key.defines.emplace_back(gl::macros::linear(1));
+// A program for the interpolation of the lattice's values. corners: it writes the corners of sixths.
+gl::ProgramKey key_between(const grid::Lattice& lattice, gl::ProgramKey key, bool corners = false) {
+  if (lattice.cube.interpolation == grid::Interpolation::linear)
+    key.defines.emplace_back(gl::macros::linear(corners ? 2 : 1));
   return key;
 }
 gl::ProgramKey cells_key(int stage) { return {"grid_cells.comp", {gl::macros::stage(stage)}}; }
@@ -205,6 +206,8 @@ void GridBuild::plan_cells() {
     needs += grid::channel_bytes(channel.channel, built_.count);
     if (channel.channel == grid::Channel::emission) needs += std::uint64_t{built_.count} * grid::glowing_words * 4;
   }
+  const bool has_corners = data_->lattice().has_corners();
+  if (has_corners) needs += std::uint64_t{built_.count} * sizeof(glm::uvec4);
   require_room(needs + built_.bytes());
   cells_.emplace(gl_, "building the grid");
   cells_->add([this, count] {
@@ -217,6 +220,12 @@ void GridBuild::plan_cells() {
     built_.cells = make_storage(std::uint64_t{built_.count} * sizeof(grid::CellRecord), "creating the cell data");
     built_.tree = make_storage((roots_words + built_.count - CM_ROOTS) * 4, "creating the point-location tree");
   });
+  if (has_corners) {
+    cells_->add([this] {
+      const std::uint64_t bytes = std::uint64_t{built_.count} * sizeof(glm::uvec4);
+      built_.corners = make_storage(bytes, "creating the corners of cells");
+    });
+  }
   cells_->add([this] {
     std::array<grid::TreeCell, CM_ROOTS> cells{};
     std::array<glm::uvec4, CM_ROOTS> links{};
@@ -248,19 +257,20 @@ void GridBuild::plan_cells() {
   });
 }
 
-void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind) {
+void GridBuild::plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind, const Bind& bind_fine) {
   const grid::CellParts& parts = grid::cell_parts(data_->lattice().cube.interpolation);
   // All cells of a level have the same size.
   std::uint32_t shape = grid::root_cells(data_->lattice().cube.log2_size)[0].shape;
   std::uint32_t begin = tree_levels_.back().splits_end;
   for (const Level& level : tree_levels_) {
     Pass pass = coarse;
-    if (core::cm_is_fine(shape)) {
+    const bool is_fine = core::cm_is_fine(shape);
+    if (is_fine) {
       pass = fine;
       const std::uint32_t fine_level = core::cm_fine_level(shape);
       pass.weight += parts_weight * (parts.first[fine_level + 1] - parts.first[fine_level]);
     }
-    passes_.plan(*cells_, pass, begin, begin + level.leaves(), bind);
+    passes_.plan(*cells_, pass, begin, begin + level.leaves(), is_fine ? bind_fine : bind);
     begin += level.leaves();
     shape = core::cm_child_shape(shape, 0);
   }
@@ -278,13 +288,19 @@ void GridBuild::plan_records() {
                   {core::CM_STORAGE_GRID_BRICKS, &data_->bricks_}});
     gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_CELL_PARTS, data_->parts_.name());
     gl_->ProgramUniform1f(program, 3, 1.0F / data_->lattice().density_unit);
-    gl_->ProgramUniform1i(program, 4, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
+    gl_->ProgramUniform1i(program, 4, grid::has_fits(data_->lattice().cells) ? 1 : 0);
   };
-  const auto key = [this](bool fine) {
+  const bool has_corners = data_->lattice().has_corners();
+  const auto bind_fine = [this, bind, has_corners](GLuint program) {
+    bind(program);
+    if (has_corners) bind_storage({{core::CM_STORAGE_GRID_CORNERS, &built_.corners}});
+  };
+  const auto key = [this, has_corners](bool fine) {
     const grid::Lattice& lattice = data_->lattice();
-    return key_between(lattice, {"grid_records.comp", {gl::macros::fine(fine), gl::macros::halves(lattice.halves)}});
+    return key_between(lattice, {"grid_records.comp", {gl::macros::fine(fine), gl::macros::halves(lattice.halves)}},
+                       fine && has_corners);
   };
-  plan_leaves({key(false), 32}, {key(true), 32}, bind);
+  plan_leaves({key(false), 32}, {key(true), 32}, bind, bind_fine);
 }
 
 void GridBuild::plan_clear_cones() {
@@ -339,11 +355,11 @@ void GridBuild::plan_channel(std::size_t index) {
                   {core::CM_STORAGE_GRID_BRICKS, &data.bricks}});
     gl_->BindBufferBase(GL_UNIFORM_BUFFER, core::CM_UNIFORM_CELL_PARTS, data_->parts_.name());
     if (channel.channel == grid::Channel::emission)
-      gl_->ProgramUniform1i(program, 3, data_->lattice().cells == grid::CellKind::linear ? 1 : 0);
+      gl_->ProgramUniform1i(program, 3, grid::has_fits(data_->lattice().cells) ? 1 : 0);
     if (channel.channel == grid::Channel::velocity) gl_->ProgramUniform1f(program, 3, channel.fastest);
   };
   const Pass pass{key_between(data_->lattice(), {"grid_channels.comp", {gl::macros::channel(channel.channel)}}), 32};
-  plan_leaves(pass, pass, bind);
+  plan_leaves(pass, pass, bind, bind);
 }
 
 void GridBuild::plan_emissive() {

@@ -67,7 +67,7 @@ class GridBuild {
   void plan_tree_cells();
   void plan_records();
   // Plans a pass over the leaves. coarse: kernel for cells larger than bricks; fine: for cells within bricks.
-  void plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind);
+  void plan_leaves(const Pass& coarse, const Pass& fine, const Bind& bind, const Bind& bind_fine);
   // Plans the channels of the cells.
   void plan_channels();
   void plan_channel(std::size_t index);

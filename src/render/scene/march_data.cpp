@@ -111,14 +111,15 @@ static_assert(sizeof(Roots) == 52 * 4, "glsl/common/buffers.glsl");
 constexpr std::size_t texel_bytes = 16;
 
 // Byte sizes and offsets of the channels of a grid's cells, in descending size of their records, so that each is
-// aligned. Behind those of 16 bytes is the table of emissive cells, behind those of 8 bytes the change.
+// aligned. Behind those of 16 bytes are the table of emissive cells and the corners, behind those of 8 bytes the
+// change.
 class ChannelBytes {
  public:
   struct Range {
     std::size_t at = 0;
     std::size_t size = 0;
   };
-  // cells, glowing: numbers of cells and of emissive cells, for grids with a plan.
+  // cells, glowing: numbers of cells and of emissive cells.
   ChannelBytes(const scene::MarchSource& source, std::size_t cells, std::size_t glowing) {
     const grid::TetGrid* made = source.grid.get();
     const auto size_of = [&](const grid::ChannelRow& row) -> std::size_t {
@@ -129,13 +130,17 @@ class ChannelBytes {
       for (const grid::ChannelRow& row : grid::channel_table) {
         if (row.record_bytes == record_bytes) channels_[grid::index_of(row.channel)] = append(size_of(row));
       }
-      if (record_bytes == 16) emissive_ = append(glowing * sizeof(scene::GlowingCell));
+      if (record_bytes == 16) {
+        emissive_ = append(glowing * sizeof(scene::GlowingCell));
+        corners_ = append(source.trilinear ? cells * sizeof(glm::uvec4) : 0);
+      }
       // Grids built on the GPU have none.
       if (record_bytes == 8) change_ = append(made != nullptr ? made->change.size() * sizeof(glm::uvec2) : 0);
     }
   }
   [[nodiscard]] const Range& of(grid::Channel channel) const { return channels_[grid::index_of(channel)]; }
   [[nodiscard]] const Range& emissive() const { return emissive_; }
+  [[nodiscard]] const Range& corners() const { return corners_; }
   [[nodiscard]] const Range& change() const { return change_; }
   // Rounded up to whole texels.
   [[nodiscard]] std::size_t all() const { return (end_ + texel_bytes - 1) / texel_bytes * texel_bytes; }
@@ -145,6 +150,7 @@ class ChannelBytes {
 
   std::array<Range, grid::channel_table.size()> channels_;
   Range emissive_;
+  Range corners_;
   Range change_;
   std::size_t end_ = 0;
 };
@@ -192,6 +198,7 @@ MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::Word
       upload_(gl_, "uploading the volume") {
   data_.march_ = source_->march;
   data_.linear_ = source_->linear;
+  data_.trilinear_ = source_->trilinear;
   for (const scene::MarchSourcePtr& source : sources) {
     if (!source->goes_with(*source_)) {
       throw Error(ErrorCode::unsupported, "grids of different types cannot be shown together");
@@ -352,6 +359,7 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
             static_cast<std::uint32_t>((first + channels.of(row.channel).at) / unit);
       }
       part.grid.first_glowing = static_cast<std::uint32_t>((first + channels.emissive().at) / texel_bytes);
+      part.grid.first_corners = static_cast<std::uint32_t>((first + channels.corners().at) / texel_bytes);
       part.grid.first_change = static_cast<std::uint32_t>((first + channels.change().at) / 4);
       part.grid.glowing = static_cast<std::uint32_t>(part.glowing);
     }
@@ -375,22 +383,20 @@ void MarchUpload::plan_channels(gl::WordHeap& heap, std::int64_t texels) {
     const grid::TetGrid* grid = grid_of(part);
     if (grid == nullptr) {
       const BuiltGrid& made = built_->at(part.source);
-      for (const grid::ChannelRow& row : grid::channel_table) {
-        const gl::Object& records = made.channels[grid::index_of(row.channel)];
-        const ChannelBytes::Range& range = channels.of(row.channel);
-        add_copy(
-            location_at(range.at),
-            [buffer = records.name()] {
-              return Upload::Location{buffer, 0};
-            },
-            range.size);
-      }
+      const auto copy = [&](const gl::Object& records, const ChannelBytes::Range& range) {
+        const auto from = [buffer = records.name()] { return Upload::Location{buffer, 0}; };
+        add_copy(location_at(range.at), from, range.size);
+      };
+      for (const grid::ChannelRow& row : grid::channel_table)
+        copy(made.channels[grid::index_of(row.channel)], channels.of(row.channel));
+      copy(made.corners, channels.corners());
       continue;
     }
     for (const grid::ChannelRow& row : grid::channel_table) {
       const ChannelBytes::Range& range = channels.of(row.channel);
       upload_.add_bytes(location_at(range.at), row.records(grid->channels).data(), range.size);
     }
+    upload_.add_bytes(location_at(channels.corners().at), grid->corners.data(), channels.corners().size);
     upload_.add_bytes(location_at(channels.change().at), grid->change.data(), channels.change().size);
   }
 }

@@ -32,6 +32,8 @@ class MarchData {
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   /// Whether the density varies in cells: linear in tetrahedra, trilinear between voxels. Else it is constant.
   [[nodiscard]] bool is_linear() const { return linear_; }
+  /// Whether it is trilinear in the finest tetrahedra.
+  [[nodiscard]] bool is_trilinear() const { return trilinear_; }
   /// Number of pages of cell records; at most max_pages.
   [[nodiscard]] std::size_t pages() const { return cells_.size(); }
   /// Whether a grid has cells of the wide format (cm_is_wide).
@@ -80,14 +82,15 @@ class MarchData {
 
   March march_ = March::tet;
   bool linear_ = false;
+  bool trilinear_ = false;
   std::vector<Part> parts_;
   gl::Object brick_values_;
   gl::Object brick_changes_;
   std::vector<gl::WordHeap::Span> cells_;  // cell records, per page
   std::uint32_t page_shift_ = 0;
   std::array<gl::Object, 2> textures_;  // voxels, or values of bricks; slots of bricks
-  // per grid: the cells' emission, the table of emissive cells, and the cells' velocities, changes, colors and
-  // anisotropies
+  // per grid: the cells' emission, the table of emissive cells, the cells' corners, and the cells' velocities, changes,
+  // colors and anisotropies
   gl::WordHeap::Span channels_;
   std::array<gl::Object, grid::channel_table.size()> voxel_channels_;  // textures of voxels, by channel
   gl::Object changes_;                                                 // of voxels, or of bricks

@@ -203,6 +203,53 @@ TEST_P(GpuGridBuilds, CoefficientsMatchTheLinearFitWithinHalfAnUlp) {
   EXPECT_GT(fitted, 1000U);
 }
 
+// The volume with its bricks as half floats.
+volume::ScalarVolume as_halves(volume::ScalarVolume volume) {
+  std::vector<std::uint16_t> halves;
+  volume.max_value = 0.0F;
+  for (std::size_t i = 0; i < volume.brick_values.size(); ++i) {
+    halves.push_back(glm::packHalf1x16(volume.brick_values[i]));
+    volume.max_value = std::max(volume.max_value, volume::value_of(halves.back()));
+  }
+  volume.brick_values = volume::BrickValues(std::move(halves));
+  return volume;
+}
+
+// Corners are the voxels, relative to the maximum and rounded, so both builders have the same. The uniform region is in
+// bricks that are stored once.
+TEST_P(GpuGridBuilds, CornersMatchThoseOfTheCpu) {
+  const gl::StateGuard guard(*gl_);
+  volume::ScalarVolume volume = test::noise_volume({60, 45, 50}, {-3, 2, 5}, 1);
+  volume.bounds_max.x += 24;
+  volume.tiles = {{{64, 8, 8}, {79, 39, 39}, 0.5F}};
+  for (const volume::ScalarVolume& values : {volume, as_halves(volume)}) {
+    const GridReference reference(values, grid::fit_cube(volume, grid::Interpolation::linear));
+    grid::RefineSettings settings;
+    settings.threshold = 0.01;
+    settings.cells = grid::CellKind::trilinear;
+    const grid::LatticePtr lattice = reference.lattice(settings);
+    ASSERT_TRUE(lattice->has_corners());
+    const render::BuiltGrid built = build(upload(lattice, reference.statistics), settings);
+    const grid::TetGrid expected = reference.grid(settings);
+    Rounding rounding;
+    const ReadGrid cells = read(built);
+    ASSERT_NO_FATAL_FAILURE(expect_same(expected, built, cells, rounding));
+    EXPECT_EQ(built.bytes(), std::uint64_t{built.count} * (32 + 4 + 16) + 28 * 4);
+    std::vector<uvec4> corners(built.count);
+    gl_->GetNamedBufferSubData(built.corners.name(), 0, static_cast<GLsizeiptr>(corners.size() * sizeof(uvec4)),
+                               corners.data());
+    std::size_t sixths = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const std::uint32_t shape = core::cm_record_shape(cells.cells[i].data);
+      if (core::cm_shape_class(shape) != 1 || core::cm_shape_exponent(shape) != 0) continue;
+      ASSERT_EQ(corners[i], expected.corners[i]) << i;
+      ++sixths;
+    }
+    EXPECT_GT(sixths, 1000U);
+    EXPECT_LT(sixths, corners.size());
+  }
+}
+
 TEST_P(GpuGridBuilds, ConstantCellsHaveNoGradient) {
   const gl::StateGuard guard(*gl_);
   const GridReference reference(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
@@ -222,14 +269,7 @@ TEST_P(GpuGridBuilds, ConstantCellsHaveNoGradient) {
 // Values that are halves in a file are used as exactly those halves.
 TEST_P(GpuGridBuilds, HalfFloatsOfAFileAreUsedExactly) {
   const gl::StateGuard guard(*gl_);
-  volume::ScalarVolume volume = test::noise_volume({60, 45, 50}, glm::ivec3(0), 1);
-  std::vector<std::uint16_t> halves;
-  volume.max_value = 0.0F;
-  for (std::size_t i = 0; i < volume.brick_values.size(); ++i) {
-    halves.push_back(glm::packHalf1x16(volume.brick_values[i]));
-    volume.max_value = std::max(volume.max_value, volume::value_of(halves.back()));
-  }
-  volume.brick_values = volume::BrickValues(std::move(halves));
+  const volume::ScalarVolume volume = as_halves(test::noise_volume({60, 45, 50}, glm::ivec3(0), 1));
   for (const auto interpolation : {grid::Interpolation::nearest, grid::Interpolation::linear}) {
     const GridReference reference(volume, grid::fit_cube(volume, interpolation));
     const grid::RefineSettings settings;

@@ -128,7 +128,8 @@ std::string text_of(const grid::RefineCamera& camera) {
 std::string text_of(const grid::RefineSettings& refine) {
   constexpr std::array criteria{"deviation", "range/mean", "transmittance"};
   const grid::RefineSettings usual;
-  return joined({refine.cells == grid::CellKind::linear ? "linear" : "constant",
+  constexpr std::array cells{"linear", "constant", "trilinear"};
+  return joined({cells.at(static_cast<std::size_t>(refine.cells)),
                  criteria.at(static_cast<std::size_t>(refine.criterion)), text_of(refine.threshold), "density scale",
                  text_of(refine.density_scale),
                  refine.anisotropy == 0.0 ? "" : "anisotropy " + text_of(refine.anisotropy),
@@ -156,8 +157,9 @@ std::string contents_of(const scene::MarchSource& source) {
     size = "voxels " + text_of(dvec3(source.box_size)) + ", " + std::to_string(source.brick_slots.size()) + " slots";
   }
   return joined({name_of(source.march),
-                 if_set(source.march == scene::March::tet, source.linear ? "linear" : "constant"), size + ", max",
-                 text_of(source.max_value), if_set(source.emits(), "emission"), if_set(source.colored(), "color"),
+                 if_set(source.march == scene::March::tet, source.linear ? "linear" : "constant"),
+                 if_set(source.trilinear, "trilinear"), size + ", max", text_of(source.max_value),
+                 if_set(source.emits(), "emission"), if_set(source.colored(), "color"),
                  if_set(source.anisotropic(), "anisotropy"), if_set(source.moves(), "velocity"),
                  if_set(source.changes(), "change")});
 }
