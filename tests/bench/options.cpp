@@ -52,6 +52,19 @@ ShaderVariant parse_variant(const std::string& text) {
   return {text.substr(0, equals), folder, constant_cells};
 }
 
+void add_interpolation(CLI::App& app, Options& options) {
+  const std::map<std::string, grid::Interpolation> names{{"nearest", grid::Interpolation::nearest},
+                                                         {"linear", grid::Interpolation::linear}};
+  app.add_option("--interpolation", options.interpolations,
+                 "nearest|linear, of all grids (default: nearest); with --peers also both, in one run")
+      ->transform(CLI::CheckedTransformer(names))
+      ->expected(1, 2);
+  app.final_callback([&options] {
+    if (options.interpolations.size() != 1 && !options.peers)
+      throw CLI::ValidationError("--interpolation", "only --peers compares two");
+  });
+}
+
 void add_peer_options(CLI::App& app, Options& options) {
   const auto take = [&options](const std::vector<std::string>& texts) {
     for (const std::string& text : texts) options.variants.push_back(parse_variant(text));
@@ -66,6 +79,7 @@ void add_peer_options(CLI::App& app, Options& options) {
       "and accepts more)");
   app.add_flag("--by-clock", options.by_clock,
                "With --peers: the clock's time, as of a GPU, instead of the processors'");
+  add_interpolation(app, options);
 }
 
 }  // namespace

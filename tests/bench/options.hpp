@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "grid/cube.hpp"
+
 namespace cumulet::bench {
 
 /// A volume to measure: a file, or a generated noise ball.
@@ -35,6 +37,7 @@ struct Options {
   std::vector<double> targets{0.03};
   std::uint32_t size = 256;
   double optical_depth = 10.0;
+  std::vector<grid::Interpolation> interpolations{grid::Interpolation::nearest};  ///< more than one: only for peers
   float albedo = 1.0F;
   int repeats = 5;
   double seconds_a_run = 10.0;

@@ -31,6 +31,7 @@ struct Entry {
   std::unique_ptr<Subject> subject;
   double bytes = 0.0;
   double threshold = 0.0;           ///< of its refinement
+  std::size_t tets = 0;             ///< the tetrahedral grid with this interpolation
   std::optional<ImageError> error;  ///< nullopt for exact ones
   std::vector<Run> runs;
 };
@@ -47,7 +48,7 @@ Entry peer(headless::Context& context, const Asset& asset, NanoType type, Look l
   Entry entry;
   entry.name = std::string("HDDA, ") + (look == Look::ratio ? "ratio" : "delta") +
                (type == NanoType::fp16 ? ", Fp16" : ", float");
-  const std::vector<std::uint32_t> words = make_nano_grid(asset.volume->volume(), type);
+  const std::vector<std::uint32_t> words = make_nano_grid(asset.volume->volume(), type, options.interpolations.front());
   entry.bytes = static_cast<double>(words.size() * sizeof(std::uint32_t));
   entry.shaders = peer_shaders(type, look);
   entry.grid = std::make_unique<BoundGrid>(gl::load_functions(headless::Context::get_proc, &context), words,
@@ -116,12 +117,11 @@ void print(const std::vector<Entry>& entries, const Options& options) {
   std::printf(
       "| Grid type | Cells | MB | Steps per path | A step, ns | Samples/s, x dense | Noise of a sample, %% | Error, "
       "%% | Time to equal variance, x tet |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
-  const auto tets = static_cast<std::size_t>(
-      std::ranges::find_if(entries, [](const Entry& entry) { return entry.error.has_value(); }) - entries.begin());
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const Entry& entry = entries[i];
     const Cost& cost = costs[i];
-    const double time = ratio_of(cost.sample, costs[tets].sample).median * cost.variance / costs[tets].variance;
+    const Cost& tets = costs[entry.tets];
+    const double time = ratio_of(cost.sample, tets.sample).median * cost.variance / tets.variance;
     std::printf("| %s | ", entry.name.c_str());
     if (entry.error) std::printf("%llu", static_cast<unsigned long long>(entry.subject->stats().cells));
     std::printf(" | %.2f | %.1f | %.1f | %.2f | %.0f | ", entry.bytes / megabyte, cost.steps,
@@ -132,10 +132,10 @@ void print(const std::vector<Entry>& entries, const Options& options) {
   }
 }
 
-}  // namespace
-
-void measure_peers(headless::Context& context, const Asset& asset, const Options& options) {
-  const double density_scale = asset.density_scale(options.optical_depth);
+/// Makes the grid types with one interpolation. Refines the tetrahedral grid to the target.
+std::vector<Entry> entries_of(headless::Context& context, const Asset& asset, const Options& options,
+                              double density_scale) {
+  const bool linear = options.interpolations.front() == grid::Interpolation::linear;
   std::vector<Entry> entries;
   for (const Kind kind : {Kind::dense, Kind::brick, Kind::tet_linear})
     entries.push_back(ours(context, asset, kind, options, density_scale));
@@ -151,8 +151,28 @@ void measure_peers(headless::Context& context, const Asset& asset, const Options
     entry.bytes = static_cast<double>(entry.subject->stats().cell_bytes);
   }
   for (const auto& [type, look] :
-       {std::pair(NanoType::float32, Look::delta), {NanoType::float32, Look::ratio}, {NanoType::fp16, Look::ratio}})
-    entries.push_back(peer(context, asset, type, look, options, density_scale));
+       {std::pair(NanoType::float32, Look::delta), {NanoType::float32, Look::ratio}, {NanoType::fp16, Look::ratio}}) {
+    if (!linear || type == NanoType::float32)
+      entries.push_back(peer(context, asset, type, look, options, density_scale));
+  }
+  for (Entry& entry : entries) entry.name += linear ? ", interpolated" : "";
+  return entries;
+}
+
+}  // namespace
+
+void measure_peers(headless::Context& context, const Asset& asset, const Options& options) {
+  const double density_scale = asset.density_scale(options.optical_depth);
+  std::vector<Entry> entries;
+  for (const grid::Interpolation interpolation : options.interpolations) {
+    Options of_one = options;
+    of_one.interpolations = {interpolation};
+    const std::size_t tets = entries.size() + 2;  // after dense and bricks
+    for (Entry& entry : entries_of(context, asset, of_one, density_scale)) {
+      entry.tets = tets;
+      entries.push_back(std::move(entry));
+    }
+  }
   for (const Entry& entry : entries) run(entry, 1, 1, options.by_clock);  // compiles
   progress("  turns");
   for (int repeat = 0; repeat < options.repeats; ++repeat) {

@@ -91,7 +91,8 @@ def main():
         xml.etree.ElementTree.parse(folder / "judged" / name)
     assert (folder / "judged/denoise-fire.png").read_bytes().startswith(b"\x89PNG")
 
-    for wrong in (["--denoise", "--scene", "moon"], ["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--triangles", "0"], ["--nonsense"]):
+    for wrong in (["--denoise", "--scene", "moon"], ["--input", "x"], ["--input", "x=@noise:1"], ["--size", "0"], ["--triangles", "0"], ["--interpolation", "cubic"],
+                  ["--interpolation", "nearest", "linear"], ["--nonsense"]):
         assert subprocess.run([program, *wrong], capture_output=True, check=False).returncode == 2, wrong
     missing = subprocess.run([program, "--input", "x=missing.vdb", "--out", str(folder / "no")], capture_output=True,
                              text=True, check=False)

@@ -43,6 +43,7 @@ viewer::Light bench_light() {
 Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind kind, const Options& options,
                  double density_scale, std::shared_ptr<viewer::Sharing> programs)
     : kind_(kind),
+      interpolation_(options.interpolations.front()),
       size_(options.size),
       albedo_(options.albedo),
       max_bounces_(options.max_bounces),
@@ -54,14 +55,19 @@ Subject::Subject(headless::Context& context, viewer::VolumeAssetPtr volume, Kind
   viewer::Medium medium;
   medium.density_scale = density_scale;
   still_.set_medium(medium);
+  still_.set_grid(grid_settings());
+}
+
+viewer::GridSettings Subject::grid_settings() const {
   viewer::GridSettings settings;
-  if (kind == Kind::dense) settings.build.march = render::March::dense;
-  if (kind == Kind::brick) settings.build.march = render::March::brick;
-  still_.set_grid(settings);
+  if (kind_ == Kind::dense) settings.build.march = render::March::dense;
+  if (kind_ == Kind::brick) settings.build.march = render::March::brick;
+  settings.build.interpolation = interpolation_;
+  return settings;
 }
 
 void Subject::refine(grid::Criterion criterion, double threshold, std::uint64_t max_cells) {
-  viewer::GridSettings settings;
+  viewer::GridSettings settings = grid_settings();
   grid::RefineSettings& refine = settings.build.refine;
   refine.criterion = criterion;
   refine.cells = kind_ == Kind::tet_constant ? grid::CellKind::constant : grid::CellKind::linear;

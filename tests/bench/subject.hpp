@@ -54,7 +54,10 @@ class Subject {
  private:
   Run trace(double density_scale, std::uint32_t samples, std::uint32_t seed, render::View view);
 
+  [[nodiscard]] viewer::GridSettings grid_settings() const;
+
   Kind kind_;
+  grid::Interpolation interpolation_;
   std::uint32_t size_;
   glm::vec3 albedo_;
   std::uint32_t max_bounces_;
