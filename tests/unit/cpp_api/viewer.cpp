@@ -191,6 +191,7 @@ TEST_F(CppViewer, LoadsAVolumeWithItsSuggestedDensityScale) {
   Viewer same = loaded(scale, false);
   Viewer denser = loaded(100.0, false);
   EXPECT_EQ(suits.get_stats()->cells, same.get_stats()->cells);
+  EXPECT_EQ(suits.get_interpolation().value(), Interpolation::linear) << "the default";
   EXPECT_EQ(picture(suits), picture(same));
   EXPECT_NE(picture(suits), picture(denser));
   // The grid is already built for this density scale.
