@@ -60,7 +60,8 @@ def main():
     fire = folder / "sample/explosion_0012.vdb"
     subprocess.run([sys.argv[3], str(fire.parent), "--only", "explosion", "--frame", "12", "--voxels", "20000"], check=True)
     command = [program, "--input", f"fire={fire}", "--size", "16", "--repeats", "4", "--samples", "16", "--target", "0.5"]
-    for flags, first, rows in (["--costs"], "| density |", 4 + 12 + 2 + 2 + 2 * 5), (["--equal-error"], "| dense |", 3), (["--peers"], "| dense |", 6):
+    for flags, first, rows in (["--costs"], "| density |", 4 + 12 + 2 + 2 + 2 * 5), (["--equal-error"], "| dense |", 3), (["--peers"], "| dense |", 7), \
+            (["--peers", "--interpolation", "nearest", "linear"], "| dense, interpolated |", 13):
         table = subprocess.run([*command, *flags], check=True, capture_output=True, text=True).stdout
         lines = [line.split("|") for line in table.splitlines() if line.startswith("| ") and "Cells" not in line]
         assert first in table and len(lines) == rows and len({len(line) for line in lines}) == 1, table
