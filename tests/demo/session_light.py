@@ -282,7 +282,7 @@ def test_auto_exposure(s):
     assert stops("off") == stops("asked"), "the menu has disabled it"
     dark, report, area = look(s, "dark")
     assert dark.mean(area) > look(s, "undone")[0].mean(area) + 30, "the image is brighter"
-    s.play("alone", [*there, 'drop "dark.hdr"', *there, *shot("alone")], "--spp", "2", auto_exposure=True)
+    s.play("alone", ["wait loaded", "frames 3", 'drop "dark.hdr"', *there, *shot("alone")], "--spp", "2", auto_exposure=True)
     assert stops("alone") > 1.5 and not s.report("alone")["modified"], "a file that is only viewed needs no saving"
     s.play("given", [*there, 'drop "dark.hdr"', *there, *shot("given")], "--volume", s.cumulus, "--spp", "2")
     assert stops("given") == 0, "--exposure 0 is given"
