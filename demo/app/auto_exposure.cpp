@@ -59,8 +59,9 @@ std::optional<float> suitable_exposure(std::span<const float> rgba, std::uint32_
 }
 
 std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool complete) {
-  if (turns_ && complete && --*turns_ <= 0) {
-    turns_.reset();
+  if (turns_ && complete) {
+    // Each of these frames begins a read, so that reads() asks for the next one. The last read counts.
+    if (--*turns_ <= 0) turns_.reset();
     if (read_ != 0) static_cast<void>(cumulet_cancel_read(viewer, std::exchange(read_, 0)));
     cumulet_read_desc desc{};
     desc.struct_size = sizeof desc;
@@ -68,7 +69,7 @@ std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool comple
     if (cumulet_begin_read(viewer, &desc, &read_) != CUMULET_OK) read_ = 0;
     return std::nullopt;
   }
-  if (read_ == 0) return std::nullopt;
+  if (turns_ || read_ == 0) return std::nullopt;
   cumulet_read_info info{};
   info.struct_size = sizeof info;
   if (cumulet_finish_read(viewer, read_, nullptr, 0, &info) != CUMULET_OK) {

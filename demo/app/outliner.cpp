@@ -196,10 +196,8 @@ void Outliner::item(Model& model, const Item& item, std::vector<Command>& comman
   const std::string title = title_of(model.scene, item);
   if (renamed_ == item) return name_field(model, item);
   bool* const visible = visibility_of(model.scene, item);
-  const bool clicked =
-      row("Scene/" + title,
-          "Selects the object. Ctrl, Shift: several. Double click: rename. Drag: order. Right click: more.",
-          row_text(model.scene, item), item, model, visible != nullptr ? ui_.px(eye_width) : 0.0f);
+  const bool clicked = row("Scene/" + title, "Selects the object. Double click: rename. Right click: more.",
+                           row_text(model.scene, item), item, model, visible != nullptr ? ui_.px(eye_width) : 0.0f);
   rows_.push_back({item, ImGui::GetItemRectMin().y, ImGui::GetItemRectMax().y});
   drag(item);
   if (clicked) click(model, item);

@@ -531,6 +531,7 @@ void Panel::help(Model& model) {
   }
   row("Wheel", "Dolly");
   row("Click", "Select an object;  drag its handles, Ctrl: snap");
+  row("Ctrl, Shift+click", "Select several objects of the list;  drag: change the order");
   row("Double click", "Type a number into a slider;  Shift+drag: fine,  right click: default");
   ImGui::End();
 }
