@@ -491,7 +491,7 @@ TEST_P(MotionBlur, VolumeMovesByItsVelocityField) {
     grids.push_back(test::settings_of(kind));
     grids.back().build.interpolation = grid::Interpolation::linear;
   }
-  grids.push_back(test::settings_of({March::tet, grid::CellKind::trilinear}));
+  grids.push_back(test::settings_of({render::March::tet, grid::CellKind::trilinear}));
   grids.back().build.interpolation = grid::Interpolation::linear;
   for (const viewer::GridSettings& grid : grids) {
     const bool linear = grid.build.interpolation == grid::Interpolation::linear;
