@@ -292,7 +292,7 @@ def test_auto_exposure(s):
 
 
 def test_first_view(s):
-    """Scenes without a camera are seen from the left and above, and fit the image, also in cumulet-render."""
+    """Scenes without a camera are seen from the left, and fit the image, also in cumulet-render."""
     there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
     s.play("volume", [*there, *shot("volume")], "--volume", s.cumulus, "--spp", "8", size=["--size", "900x600"])
     s.play("model", [*there, *shot("model")], "--gltf", f"{s.scene}/mountains.glb", "--spp", "2", size=["--size", "900x600"])
@@ -300,7 +300,7 @@ def test_first_view(s):
         camera = s.report(name)["scene"]["camera"]
         x, y, z = (a - b for a, b in zip(camera["eye"], camera["target"]))
         assert abs(math.degrees(math.atan2(x, z)) + 40) < 0.1, camera
-        assert abs(math.degrees(math.atan2(y, math.hypot(x, z))) - 20) < 0.1, camera
+        assert 5 < math.degrees(math.atan2(y, math.hypot(x, z))) < 15, f"the horizon is in the picture: {camera}"
     picture, report, area = look(s, "volume")
     x, y, width, height = report["viewport"]
     file = s.out / "volume-render.png"
