@@ -348,22 +348,23 @@ void App::accept(const Answer& answer) {
     const auto& grids = model_.grids;
     const auto shown = std::ranges::count_if(grids, [](const GridInfo& grid) { return grid.refusal.empty(); });
     const bool clear = std::ranges::any_of(grids, [](const GridInfo& grid) { return grid.name == "density"; });
-    if (shown > 1 && !clear) panel_.picker().open(model_.scene.volume, Window::wake);
+    if (shown > 1 && !clear && !burns()) panel_.picker().open(model_.scene.volume, Window::wake);
   }
   if (!exchange_.waiting()) loading_.starting = false;
   if (answer.metered) take_exposure(*answer.metered);
   if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }
 
+bool App::burns() const { return derived_.look && !demo::is_unsaid(*derived_.look); }
+
 void App::take_look(const cumulet_medium_desc& look) {
   // Another grid of a fire keeps the light that the user chose for the first one.
-  const bool burned = derived_.look && !demo::is_unsaid(*derived_.look);
+  const bool burned = burns();
   derived_.look = look;
   model_.scene.medium = look;
-  const bool burns = !demo::is_unsaid(look);
-  if (!burns) give_day(model_.scene, derived_.exposure);
+  if (!burns()) give_day(model_.scene, derived_.exposure);
   // A view of OpenColorIO replaces the tone map.
-  if (burns && !burned && options_.viewer.ocio.config.empty() && take_dusk(model_.scene, derived_.exposure))
+  if (burns() && !burned && options_.viewer.ocio.config.empty() && take_dusk(model_.scene, derived_.exposure))
     show_message(
         model_, false, "The volume burns: dusk light and the filmic tone map", now_,
         MessageButton{"Daylight", "Sets the default daylight and tone map. Ctrl+Z undoes that.", {Action::daylight}});

@@ -100,6 +100,8 @@ class App {
   void take();
   void accept(const Answer& answer);
   void remember_files(const Answer& answer);
+  /// Whether the volume has the default medium of a fire, so that its flames are displayed.
+  [[nodiscard]] bool burns() const;
   /// Sets the default medium of a volume, and dusk light if it burns.
   void take_look(const cumulet_medium_desc& look);
   /// Returns true if the medium was set neither by the user nor by a flag or scene file.
