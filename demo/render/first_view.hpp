@@ -4,8 +4,8 @@
 
 namespace cumulet::demo {
 
-/// Turns the viewer's camera, which the library has placed, into the programs' first view: a 3/4 view from the left that
-/// fits the scene. Does nothing while the camera waits for a scene.
+/// Turns the viewer's camera, which the library has placed, into the programs' first view: a 3/4 view from the left
+/// that fits the scene. Does nothing while the camera waits for a scene.
 void turn_to_first_view(cumulet_viewer* viewer);
 
 }  // namespace cumulet::demo

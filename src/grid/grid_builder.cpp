@@ -322,7 +322,8 @@ class GridBuilder::LeafDensity {
 class GridBuilder::LeafCorners {
  public:
   LeafCorners(const Statistics& density, float unit) : density_(&density), to_relative_(1.0F / unit) {}
-  // Returns them as half floats; the order is that of cm_corner_offset (glsl/traversal/trilinear.glsl) in the frame of the sixth.
+  // Returns them as half floats; the order is that of cm_corner_offset (glsl/traversal/trilinear.glsl) in the frame of
+  // the sixth.
   glm::uvec4 operator()(const Node& node, const vec3& centroid) {
     glm::uvec4 words(0U);
     if (node.heap < 512) return words;

@@ -2223,11 +2223,11 @@ typedef enum cumulet_grid_type {
 
 /** The density inside a tetrahedral cell. */
 typedef enum cumulet_cell_density {
-  CUMULET_CELLS_LINEAR = 0,  /**< Linear least-squares fit, non-negative, with the exact mean. */
+  CUMULET_CELLS_LINEAR = 0,   /**< Linear least-squares fit, non-negative, with the exact mean. */
   CUMULET_CELLS_CONSTANT = 1, /**< The mean. */
   /**
-   * For close views with CUMULET_INTERPOLATION_LINEAR: as CUMULET_CELLS_LINEAR, but the finest cells, which are sixths of
-   * the cells between eight voxels, have the interpolated field itself. So there are no edges between them. Their
+   * For close views with CUMULET_INTERPOLATION_LINEAR: as CUMULET_CELLS_LINEAR, but the finest cells, which are sixths
+   * of the cells between eight voxels, have the interpolated field itself. So there are no edges between them. Their
    * emission stays a linear fit. A cell takes 16 bytes more. Without interpolation the same as CUMULET_CELLS_LINEAR.
    */
   CUMULET_CELLS_TRILINEAR = 2
