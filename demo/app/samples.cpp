@@ -1,7 +1,7 @@
 #include "samples.hpp"
 
 #include <fcntl.h>
-#include <signal.h>
+#include <signal.h>  // NOLINT(modernize-deprecated-headers): kill() is POSIX
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
 #version 450
 // Estimates the noise's variance. A pixel's few samples say little about it (a single one nothing), so its neighbors
-// contribute. Differences between pixels count only if no pixel has two samples. If a pixel's own samples differ more
-// than that, their variance counts, so that the filter replaces a pixel with a rare bright sample by its neighbors.
+// contribute. Differences between pixels count only if no pixel has two samples. If a pixel's own samples differ much
+// more than that, their variance counts, so that the filter replaces a pixel with a rare bright sample by its neighbors.
 //
 // Fireflies are dimmed first. A firefly is a pixel much brighter than all similar pixels nearby, and than its own
 // samples make certain. It is dimmed to slightly more than the brightest neighbor; otherwise it would spread as a blob,
@@ -23,6 +23,8 @@ layout(rgba32f, binding = CM_IMAGE_WAVELET_BEHIND) uniform image2D cm_behind;
 #define CM_BRIGHTER 1.5
 // In standard errors.
 #define CM_CERTAIN 2.0
+// A pixel's own variance counts above this multiple of its neighborhood's.
+#define CM_NOISIER 2.0
 // Minimum similarity of a pixel, and minimum number of lit pixels, for the test.
 #define CM_ALIKE 0.1
 #define CM_LIT 6u
@@ -86,10 +88,13 @@ float cm_dimmed(vec4 front, vec4 spread, CmBrightest about) {
   return luminance > room ? room / luminance : 1.0;
 }
 
-// Variance of the mean of a pixel's own samples, after dimming; 0 if it has fewer than two.
+// Variance of the mean of a pixel's own samples that cover it, after dimming; 0 if it has fewer than two. Samples that
+// do not cover the pixel are dark, which is no noise.
 float cm_own_variance(vec4 front, vec4 spread, float dimmed) {
+  if (spread.z < 2.0) return 0.0;
   float luminance = cm_luminance(front.rgb);
-  return dimmed * dimmed * max(0.0, spread.y - luminance * luminance) / max(spread.z - 1.0, 1.0);
+  float covered = max(1.0 - front.a, 1.0 / spread.z);
+  return dimmed * dimmed * max(0.0, spread.y - luminance * luminance / covered) / (spread.z - 1.0);
 }
 
 void main() {
@@ -155,7 +160,8 @@ void main() {
   vec4 own = texelFetch(cm_front, texel, 0);
   if (here.finite) {
     float dimmed = cm_dimmed(own, spread, about);
-    if (own_samples >= 2.0) variance.x = max(variance.x, cm_own_variance(own, spread, dimmed));
+    float own_variance = cm_own_variance(own, spread, dimmed);
+    if (own_variance > CM_NOISIER * variance.x) variance.x = own_variance;
     own.rgb *= dimmed;
   }
   imageStore(cm_front_out, texel, own);

@@ -15,6 +15,7 @@ namespace cumulet::test {
 inline std::string glsl_file(const std::string& name) {
   constexpr std::string_view include = "#include \"";
   std::ifstream in(std::filesystem::path(CUMULET_GLSL_DIR) / name);
+  if (!in) throw std::runtime_error("there is no glsl/" + name);
   std::string text;
   for (std::string line; std::getline(in, line);) {
     text += line.starts_with(include) ? glsl_file(line.substr(include.size(), line.rfind('"') - include.size())) : line;

@@ -204,7 +204,7 @@ TEST_F(Contract, Contract02DescriptorsHaveSizesAndEnumsNoUnknownValues) {
 
   check_enum("gl_state", &cumulet_create_desc::gl_state, 2, create);
   check_enum("type", &cumulet_grid_desc::type, 3, grid);
-  check_enum("cells", &cumulet_grid_desc::cells, 2, grid);
+  check_enum("cells", &cumulet_grid_desc::cells, 3, grid);
   check_enum("criterion", &cumulet_grid_desc::criterion, 3, grid);
   check_enum("view", &cumulet_sampling_desc::view, 5, sampling);
   check_enum("preview", &cumulet_sampling_desc::preview, 2, sampling);

@@ -128,7 +128,8 @@ class GridSetUploads : public test::GlTest {
     std::string text = "#version 450\nlayout(local_size_x = 64) in;\n#define CM_CHANNELS 1\n#define CM_VELOCITY 1\n";
     for (const std::string& define : render::grid_macros(render::grid_features(data, false)))
       text += "#define " + define + "\n";
-    for (const char* file : {"shared.glsl", "bindings.glsl", "parameters.glsl", "cell.glsl", "buffers.glsl"})
+    for (const char* file : {"common/shared.glsl", "common/bindings.glsl", "common/parameters.glsl", "grid/cell.glsl",
+                             "common/buffers.glsl"})
       text += test::glsl_file(file);
     const std::array<const char*, kinds.size()> values{
         "cm_record(i >> 1, i & 1u)",

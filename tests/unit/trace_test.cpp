@@ -214,22 +214,23 @@ TEST_P(Trace, GridTypesAgreeOnConstantCellsAtVoxelResolution) {
 
 TEST_P(Trace, ImageDoesNotDependOnThePageSize) {
   const auto viewer = make();
-  viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(0), 2));
   viewer->set_medium({0.4, vec3(1.0F), {0.0F}, 0});
   viewer->set_light({30.0F, 30.0F, vec3(3.0F), vec3(0.3F)});
-  const viewer::GridSettings settings = test::settings_of(test::march_kinds[0], 0.01);
-  viewer->set_grid(settings);
+  viewer->set_grid(test::settings_of(test::march_kinds[0], 0.01));
+  // A volume keeps its grids, so that each upload needs another volume.
+  const auto show = [&] { viewer->set_volume(test::noise_volume({40, 36, 30}, ivec3(0), 2)); };
+  show();
   const test::Image image{24, 24, 8, 1, render::View::shaded};
   const test::Picture whole = test::render(*viewer, image);
   const auto cells = static_cast<std::int64_t>(viewer->viewer().stats().cells);
   for (const std::int64_t parts : {2, 3}) {
     viewer->viewer().set_page_texels(2 * (cells / parts + 1));
-    viewer->set_grid(settings);
+    show();
     const test::Picture paged = test::render(*viewer, image);
     EXPECT_EQ(whole.pixels, paged.pixels);
   }
   viewer->viewer().set_page_texels(64);
-  viewer->set_grid(settings);
+  show();
   try {
     viewer->build();
     FAIL() << "6 pages of 32 cells cannot hold " << cells;
@@ -241,7 +242,7 @@ TEST_P(Trace, ImageDoesNotDependOnThePageSize) {
   while (!viewer->render(10.0)) {
   }
   viewer->viewer().set_page_texels(0);
-  viewer->set_grid(settings);
+  show();
   EXPECT_EQ(whole.pixels, test::render(*viewer, image).pixels);
 }
 
