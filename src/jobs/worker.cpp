@@ -1,5 +1,6 @@
 #include "jobs/worker.hpp"
 
+#include <new>
 #include <utility>
 
 namespace cumulet::viewer {
@@ -24,7 +25,7 @@ std::optional<Error> failure_of(const Worker::Job& job, const ResourceLimitsPtr&
 Worker::~Worker() {
   if (process_ != getpid()) {
     // A forked child does not have the threads, so that destroying the pool would wait forever.
-    static_cast<void>(new std::shared_ptr<WorkerPool>(std::move(pool_)));
+    static_cast<void>(new (std::nothrow) std::shared_ptr<WorkerPool>(std::move(pool_)));
     return;
   }
   task_->forget_stop();
