@@ -118,7 +118,7 @@ CM_FN CmBernstein cm_density_along(uvec4 data, uint cell, CmFrame f, uint shape,
     vec3 low = vec3(0.0f, 0.0f, 0.0f);
     vec3 high = vec3(1.0f, 1.0f, 1.0f);
     r = cm_trilinear_along(cm_cell_corners(cell), clamp(from + t * f.d, low, high), clamp(from + t_1 * f.d, low, high));
-    // What remains of the fit is its change since mid-shutter.
+    // The rest of the fit is its change since mid-shutter.
     fit -= cm_record_fit(data);
   }
   vec2 density = cm_fit_along(fit, f, shape);

@@ -104,7 +104,7 @@ class VolumeAsset {
                                          const grid::RefineSettings& refine, Progress& progress) const;
   /// Returns the emission settings that apply to this volume: fills in values that `emission` leaves open.
   [[nodiscard]] scene::Emission emission_by(const scene::Emission& emission) const;
-  /// Returns what users of the volume share beside it, made by the first call. There is one type of it.
+  /// Returns the object that users of the volume share beside it, made by the first call. There is one type of it.
   template <class Kept>
   [[nodiscard]] std::shared_ptr<Kept> kept() const {
     const std::scoped_lock lock(mutex_);

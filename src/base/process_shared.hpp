@@ -5,7 +5,7 @@
 
 namespace cumulet {
 
-/// Returns the object that users of threads in this process share, made by `make` if nobody holds it. There is one: the
+/// Returns the object that users of threads in this process share, made by `make` unless one exists. There is one: the
 /// list of library_thread.cpp keeps a weak reference to it. A forked child gets its own, because it has none of the
 /// threads. Thread-safe.
 [[nodiscard]] std::shared_ptr<void> shared_in_process(const std::function<std::shared_ptr<void>()>& make);

@@ -35,7 +35,8 @@ class WorkerPool {
 
   class Task {
    public:
-    /// work: what the pool runs. stop: makes it return soon. It is called on any thread when the process ends.
+    /// work: the function that the pool runs. stop: makes it return soon. It is called on any thread when the process
+    /// ends.
     Task(std::function<void()> work, std::function<void()> stop) : work_(std::move(work)), stop_(std::move(stop)) {}
     void work() const { work_(); }
     void stop() const {

@@ -2164,7 +2164,7 @@ typedef struct cumulet_limits_desc {
   uint32_t threads;
   /**
    * Maximum main memory in bytes for volumes and grids: the voxels of the displayed volume, the data that is computed
-   * from them once, and the cells (cumulet_stats.memory_bytes). What viewers share, each of them counts whole. For a
+   * from them once, and the cells (cumulet_stats.memory_bytes). Each viewer counts all that it shares. For a
    * sequence it limits all ready frames, if it is less than the sequence's memory_bytes.
    *
    * Cells are coarsened to fit (cumulet_stats.limited). If even the coarsest do not fit, the load or build fails with
