@@ -1,5 +1,5 @@
 // The traversal stages of a path: free-flight distance sampling on the grid. Shared by GLSL and C++. The includer
-// provides what glsl/path/path.glsl asks for, and
+// provides the functions that glsl/path/path.glsl names, and
 //   uvec3 cm_march_enter(vec3 p)                  the cell (or voxel) that contains point p of cube space
 //   CmMarchRay cm_march_ray(vec3 o, vec3 d)
 //   void cm_march_step(uvec3 cell, CmMarchRay ray, t, t_1, CmBernstein r, next)

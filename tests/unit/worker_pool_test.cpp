@@ -121,7 +121,7 @@ TEST(WorkerPoolTest, LongJobMakesWay) {
   std::function<void(Progress&)> rest = [&](Progress&) {
     while (parts < 4) {
       if (++parts == 2) {
-        EXPECT_FALSE(large.continue_later(job(rest)));  // nobody waits
+        EXPECT_FALSE(large.continue_later(job(rest)));  // no worker waits
         small.post(job([&](Progress&) {
           parts_before = parts;
           small_ran = true;
