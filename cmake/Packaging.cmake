@@ -79,6 +79,10 @@ if(TARGET cumulet_python)
   add_dependencies(cumulet_wheel cumulet cumulet_headless_c cumulet_python)
 endif()
 
+if(TARGET cumulet-file-dialog)  # only cumulet-demo starts it
+  install(TARGETS cumulet-file-dialog RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/cumulet COMPONENT programs)
+endif()
+
 # The manual page and the completions of each program, generated from its own table of options.
 set(manual_files)
 set(scripts)

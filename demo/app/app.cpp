@@ -78,6 +78,7 @@ App::App(DemoOptions options)
   changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds, model_.scene);
   if (!options_.open.empty()) open(options_.open);
   history_.emplace(model_.scene);
+  choose_dialogs();
   offer_recovery();
 }
 
@@ -109,7 +110,7 @@ double App::patience() const {
   if (now_ - last_event_ < event_emissive) return std::min(wait, emissive_frame);
   constexpr double blink = 0.4;
   constexpr double slow_frame = 0.1;
-  if (samples_.files.writes()) wait = std::min(wait, slow_frame);
+  if (samples_.files.writes() || panel_.dialog().waits()) wait = std::min(wait, slow_frame);
   if (ImGui::GetIO().WantTextInput) wait = std::min(wait, blink);
   for (const Message& message : model_.messages)
     if (!message.error) wait = std::min(wait, std::max(message.until - now_, slow_frame));

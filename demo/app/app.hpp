@@ -55,6 +55,8 @@ class App {
   void execute(const std::vector<Command>& commands);
   void execute(const Command& command);
   /// Opens the file dialog in the last used folder. endings: the extensions of files that it lists.
+  /// Uses the desktop's file dialogs or the program's own, as the preferences say. A replay uses the own ones.
+  void choose_dialogs();
   void open_dialog(const char* title, Action action, std::vector<std::string> endings);
   /// Opens the file dialog for a new file with this extension.
   void save_dialog(const char* title, Action action, const char* ending);

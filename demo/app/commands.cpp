@@ -187,6 +187,12 @@ struct App::Commands {
          bool& on = app.model_.preferences.auto_exposure;
          on = !on;
        }},
+      {Action::toggle_desktop_dialogs,
+       [](App& app, const Command&) {
+         bool& on = app.model_.preferences.desktop_dialogs;
+         on = !on;
+         app.choose_dialogs();
+       }},
       {Action::next_grid_type,
        [](App& app, const Command&) {
          cumulet_grid_type& type = app.model_.scene.grid.type;
@@ -269,6 +275,13 @@ void App::execute(const std::vector<Command>& commands) {
 void App::execute(const Command& command) {
   static_assert(Commands::is_complete());
   Commands::table[static_cast<std::size_t>(command.action)].run(*this, command);
+}
+
+void App::choose_dialogs() {
+  if (model_.preferences.desktop_dialogs && options_.replay.empty())
+    panel_.dialog().use_desktop(desktop_dialog_program(), window_->portal_name());
+  else
+    panel_.dialog().use_own();
 }
 
 void App::open_dialog(const char* title, Action action, std::vector<std::string> endings) {

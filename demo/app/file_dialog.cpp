@@ -5,13 +5,20 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <stdexcept>
 #include <system_error>
-#include <tuple>
 #include <utility>
 
 namespace cumulet::demo {
 
 namespace fs = std::filesystem;
+
+void FileDialog::use_desktop(const std::string& program, std::string parent) {
+  desktop_.reset();
+  if (program.empty()) return;
+  desktop_.emplace(program);
+  parent_ = std::move(parent);
+}
 
 void FileDialog::open(const std::string& title, Action done, std::vector<std::string> endings,
                       const std::string& suggestion) {
@@ -20,37 +27,27 @@ void FileDialog::open(const std::string& title, Action done, std::vector<std::st
   done_ = done;
   endings_ = std::move(endings);
   trouble_.clear();
+  search_.clear();
   std::error_code error;
   const fs::path start(suggestion);
   fs::path folder = saving() ? start.parent_path() : start;
   if (folder.empty() || !fs::is_directory(folder, error)) folder = fs::current_path(error);
   enter(folder.string());
   path_ = saving() ? (folder / start.filename()).string() : "";
+  if (desktop_ && !desktop_->open({saving(), title_, parent_, folder_, start.filename().string(), endings_}))
+    desktop_.reset();
 }
 
 void FileDialog::enter(const std::string& folder) {
   std::error_code error;
   const fs::path there = fs::absolute(folder, error).lexically_normal();
-  std::vector<Entry> entries;
-  fs::directory_iterator iterator(there, fs::directory_options::skip_permission_denied, error);
-  if (error) {
-    trouble_ = there.string() + ": " + error.message();
+  try {
+    entries_ = list_folder(there.string(), endings_);
+  } catch (const std::runtime_error& cause) {
+    trouble_ = cause.what();
     return;
   }
-  for (; iterator != fs::directory_iterator(); iterator.increment(error)) {
-    if (error) break;
-    const std::string name = iterator->path().filename().string();
-    if (name.empty() || name[0] == '.') continue;
-    std::error_code ignored;
-    const bool is_folder = iterator->is_directory(ignored);
-    if (is_folder || takes(name)) entries.push_back({name, is_folder});
-  }
-  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
-    return std::make_tuple(!a.folder, a.name) < std::make_tuple(!b.folder, b.name);
-  });
-  if (there.has_parent_path() && there != there.root_path()) entries.insert(entries.begin(), {"..", true});
   folder_ = there.string();
-  entries_ = std::move(entries);
   trouble_.clear();
 }
 
@@ -80,29 +77,84 @@ void FileDialog::choose(std::vector<Command>& commands) {
 }
 
 void FileDialog::close() {
-  open_ = false;
+  open_ = opening_ = false;
   ImGui::CloseCurrentPopup();
 }
 
+void FileDialog::take_desktop_result(const DesktopDialog::Result& result, std::vector<Command>& commands) {
+  using Outcome = DesktopDialog::Result::Outcome;
+  if (result.outcome == Outcome::closed) return close();
+  if (result.outcome == Outcome::failed) {
+    // The desktop has no portal, so that other dialogs would fail as well.
+    desktop_.reset();
+    return;
+  }
+  path_ = result.path;
+  // The desktop has asked about replacing the chosen file, not about the one that has an extension added.
+  std::error_code error;
+  const bool other_file = saving() && !takes(path_) && fs::exists(path_ + endings_.front(), error);
+  if (other_file) {
+    path_ += endings_.front();
+    return;
+  }
+  choose(commands);
+}
+
+void FileDialog::draw_places(Ui& ui, const Preferences& preferences) {
+  const std::vector<Place> all = places(preferences.recent);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (Ui::entry(end_of(all[i].label, ImGui::GetContentRegionAvail().x), i, all[i].folder == folder_,
+                  ImGuiSelectableFlags_DontClosePopups)) {
+      const std::string name = fs::path(path_).filename().string();
+      enter(all[i].folder);
+      path_ = saving() ? (fs::path(folder_) / name).string() : "";
+    }
+    ui.remember(("Places/" + all[i].label).c_str(), all[i].folder.c_str());
+  }
+}
+
 void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
-  ImGui::BeginChild("files", {0.0f, ui.px(240.0f)}, true, ImGuiWindowFlags_NavFlattened);
+  constexpr ImGuiTableFlags look = ImGuiTableFlags_Sortable | ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg;
+  if (!ImGui::BeginTable("files", 3, look, {0.0f, ui.px(240.0f)})) return;
+  ImGui::TableSetupScrollFreeze(0, 1);
+  ImGui::TableSetupColumn("Name", ImGuiTableColumnFlags_DefaultSort | ImGuiTableColumnFlags_WidthStretch);
+  ImGui::TableSetupColumn("Size", ImGuiTableColumnFlags_WidthFixed, ui.px(70.0f));
+  ImGui::TableSetupColumn("Date", ImGuiTableColumnFlags_WidthFixed, ui.px(120.0f));
+  ImGui::TableHeadersRow();
+  if (const ImGuiTableSortSpecs* sort = ImGui::TableGetSortSpecs(); sort != nullptr && sort->SpecsCount > 0)
+    sort_entries(entries_, static_cast<FolderOrder>(sort->Specs->ColumnIndex),
+                 sort->Specs->SortDirection == ImGuiSortDirection_Descending);
   std::string entered;
+  if (const fs::path up = fs::path(folder_).parent_path(); up != folder_) {
+    ImGui::TableNextColumn();
+    if (Ui::entry("../", entries_.size(), false, ImGuiSelectableFlags_DontClosePopups)) entered = up.string();
+    ui.remember("../", "Opens the folder above.");
+    ImGui::TableNextRow();
+  }
   for (std::size_t i = 0; i < entries_.size(); ++i) {
-    const Entry& entry = entries_[i];
+    const FolderEntry& entry = entries_[i];
+    if (!matches(entry.name, search_)) continue;
     const std::string shown = entry.folder ? entry.name + "/" : entry.name;
-    const fs::path path = (fs::path(folder_) / entry.name).lexically_normal();
-    if (Ui::entry(shown, i, !entry.folder && path.string() == path_, ImGuiSelectableFlags_DontClosePopups)) {
+    const std::string path = (fs::path(folder_) / entry.name).string();
+    ImGui::TableNextColumn();
+    if (Ui::entry(shown, i, !entry.folder && path == path_,
+                  ImGuiSelectableFlags_DontClosePopups | ImGuiSelectableFlags_SpanAllColumns)) {
       if (entry.folder)
-        entered = path.string();
+        entered = path;
       else
-        path_ = path.string();
+        path_ = path;
     }
     ui.remember(shown.c_str(), entry.folder ? "Opens the folder." : "Selects the file; double-click to open.");
     if (!entry.folder && ImGui::IsItemHovered() && ImGui::IsMouseDoubleClicked(0)) choose(commands);
+    ImGui::TableNextColumn();
+    ImGui::TextDisabled("%s", entry.size.c_str());
+    ImGui::TableNextColumn();
+    ImGui::TextDisabled("%s", entry.date.c_str());
   }
-  ImGui::EndChild();
+  ImGui::EndTable();
   if (entered.empty()) return;
   const std::string name = fs::path(path_).filename().string();
+  search_.clear();
   enter(entered);
   path_ = saving() ? (fs::path(folder_) / name).string() : "";
 }
@@ -134,28 +186,7 @@ std::string FileDialog::endings_text() const {
   return text;
 }
 
-void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
-  const std::string id = title_ + "###dialog";
-  if (opening_) ImGui::OpenPopup(id.c_str());
-  const ImVec2 screen = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
-  ImGui::SetNextWindowSize({std::min(ui.px(560.0f), screen.x * 0.95f), 0.0f});
-  open_ = ImGui::BeginPopupModal(
-      id.c_str(), nullptr, ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_AlwaysAutoResize);
-  if (!open_) {
-    opening_ = false;
-    return;
-  }
-  if (opening_) ImGui::SetKeyboardFocusHere();
-  opening_ = false;
-  const std::string endings = endings_text();
-  if (ui.text("Path", ("Full path of the file: " + endings + ". Press Enter to accept.").c_str(),
-              saving() ? "File name" : "Type a path or select a file below", path_))
-    choose(commands);
-  ImGui::Spacing();
-  recent(ui, preferences, commands);
-  Ui::heading(end_of(folder_, ImGui::GetContentRegionAvail().x).c_str());
-  list(ui, commands);
+void FileDialog::draw_trouble(const std::string& endings) const {
   std::error_code error;
   if (!trouble_.empty()) {
     ImGui::PushStyleColor(ImGuiCol_Text, {0.95f, 0.55f, 0.45f, 1.0f});
@@ -166,12 +197,63 @@ void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Comman
   } else {
     Ui::heading(endings.c_str());
   }
+}
+
+void FileDialog::draw(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
+  const std::string id = title_ + "###dialog";
+  if (opening_ && !open_) ImGui::OpenPopup(id.c_str());
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
+  ImGui::SetNextWindowSize({std::min(ui.px(waits() ? 360.0f : 680.0f), screen.x * 0.95f), 0.0f});
+  open_ = ImGui::BeginPopupModal(
+      id.c_str(), nullptr, ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_AlwaysAutoResize);
+  if (!open_) {
+    opening_ = false;
+    if (waits()) desktop_->close();
+    return;
+  }
+  if (waits())
+    draw_waiting(ui, commands);
+  else
+    draw_own(ui, preferences, commands);
+  ImGui::EndPopup();
+}
+
+void FileDialog::draw_waiting(Ui& ui, std::vector<Command>& commands) {
+  // The own dialog has its focus when it is drawn first, should the desktop's fail.
+  ImGui::TextUnformatted("The desktop shows the file dialog.");
+  ImGui::Spacing();
+  const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
+  if (ui.button("Close", "Closes the desktop's dialog (Escape).", {ui.px(110.0f), 0.0f}) || escape) {
+    desktop_->close();
+    close();
+  } else if (const auto result = desktop_->take()) {
+    take_desktop_result(*result, commands);
+  }
+}
+
+void FileDialog::draw_own(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
+  if (opening_) ImGui::SetKeyboardFocusHere();
+  opening_ = false;
+  const std::string endings = endings_text();
+  if (ui.text("Path", ("Full path of the file: " + endings + ". Press Enter to accept.").c_str(),
+              saving() ? "File name" : "Type a path or select a file below", path_))
+    choose(commands);
+  ImGui::Spacing();
+  recent(ui, preferences, commands);
+  Ui::heading(end_of(folder_, ImGui::GetContentRegionAvail().x).c_str());
+  static_cast<void>(ui.text("Search", "Lists only names that contain these words.", "Part of a name", search_));
+  ImGui::BeginChild("places", {ui.px(130.0f), ui.px(240.0f)}, true, ImGuiWindowFlags_NavFlattened);
+  draw_places(ui, preferences);
+  ImGui::EndChild();
+  ImGui::SameLine();
+  list(ui, commands);
+  draw_trouble(endings);
   ImGui::Spacing();
   if (ui.button(saving() ? "Save file" : "Open file", "Uses the path above.", {ui.px(110.0f), 0.0f})) choose(commands);
   ImGui::SameLine();
   const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) && !ImGui::IsAnyItemActive();
   if (ui.button("Close", "Closes the dialog (Escape).", {ui.px(110.0f), 0.0f}) || escape) close();
-  ImGui::EndPopup();
 }
 
 }  // namespace cumulet::demo

@@ -59,6 +59,11 @@ Menu file_menu() {
            {"Add volume...", {Action::add_volume_dialog}, "Adds another volume."},
            {"Add model...", {Action::add_model_dialog}, "Adds another model."},
            {"Open environment...", {Action::environment_dialog}, "Opens an .hdr or .exr environment map."},
+           {"Desktop's file dialogs",
+            {Action::toggle_desktop_dialogs},
+            "Uses the file dialogs of the desktop where it has some.",
+            nullptr,
+            [](const Model& model) { return model.preferences.desktop_dialogs; }},
            separator,
            {"Quit", {Action::quit}, "Ends the program. Asks if there are unsaved changes."}}};
 }

@@ -76,6 +76,7 @@ enum class Action {
   darker,
   auto_exposure,         // sets the exposure that suits the displayed image
   toggle_auto_exposure,  // the same after each load
+  toggle_desktop_dialogs,
   next_grid_type,
   view,  // value: a cumulet_view_mode
   grids_dialog,

@@ -28,6 +28,7 @@ class Panel {
 
   void focus() { focus_ = true; }
   [[nodiscard]] FileDialog& dialog() { return dialog_; }
+  [[nodiscard]] const FileDialog& dialog() const { return dialog_; }
   /// Returns true if a modal dialog is open.
   [[nodiscard]] bool dialog_open() const {
     return dialog_.is_open() || picker_.is_open() || question_.is_open() || render_dialog_.is_open();

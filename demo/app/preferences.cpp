@@ -74,6 +74,7 @@ Preferences load_preferences(const std::string& path) {
     const int percent = json.value("scale_percent", preferences.scale_percent);
     preferences.scale_percent = percent == 0 ? 0 : std::clamp(percent, 100, 200);
     preferences.auto_exposure = json.value("auto_exposure", preferences.auto_exposure);
+    preferences.desktop_dialogs = json.value("desktop_dialogs", preferences.desktop_dialogs);
     preferences.autosave_seconds =
         std::clamp(json.value("autosave_seconds", preferences.autosave_seconds), min_autosave, max_autosave);
     preferences.height = std::clamp(json.value("height", preferences.height), min_side, max_side);
@@ -94,6 +95,7 @@ void save_preferences(const Preferences& preferences, const std::string& path) {
   json["panel_width"] = preferences.panel_width;
   json["scale_percent"] = preferences.scale_percent;
   json["auto_exposure"] = preferences.auto_exposure;
+  json["desktop_dialogs"] = preferences.desktop_dialogs;
   json["autosave_seconds"] = preferences.autosave_seconds;
   std::error_code error;
   fs::create_directories(fs::path(path).parent_path(), error);

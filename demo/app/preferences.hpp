@@ -20,6 +20,7 @@ struct Preferences {
   float panel_width = 372.0f;      // at user interface scale 1
   int scale_percent = 0;           // of the user interface; 0: as the screen
   bool auto_exposure = true;       // measure the exposure after each load
+  bool desktop_dialogs = true;     // the desktop's file dialogs where it has some
   double autosave_seconds = 60.0;  // between two copies of unsaved changes
 
   /// Puts a file at the top of the recent files and stores its folder. Scenes do not displace other files, and vice

@@ -1,10 +1,6 @@
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <iostream>
@@ -13,29 +9,11 @@
 #include <vector>
 
 #include "app.hpp"
+#include "file_facts.hpp"
 #include "selection.hpp"
 
 // Scene files, and the protection of unsaved changes.
 namespace cumulet::demo {
-namespace {
-
-/// Returns the time at which the file was written: "14:05", with the date if that is not today.
-std::string time_of(const std::string& path) {
-  struct stat status {};
-  std::tm written{};
-  std::tm today{};
-  const std::time_t now = std::time(nullptr);
-  if (::stat(path.c_str(), &status) != 0 || ::localtime_r(&status.st_mtime, &written) == nullptr ||
-      ::localtime_r(&now, &today) == nullptr)
-    return "an unknown time";
-  const bool is_today = written.tm_year == today.tm_year && written.tm_yday == today.tm_yday;
-  std::array<char, 32> text{};
-  const std::size_t length = std::strftime(text.data(), text.size(), is_today ? "%H:%M" : "%Y-%m-%d %H:%M", &written);
-  return {text.data(), length};
-}
-
-}  // namespace
-
 void App::show(SceneOptions scene, const std::string& path) {
   spell_out_defaults(scene);
   scene.width = model_.scene.width;
@@ -120,7 +98,7 @@ void App::offer_recovery() {
   const std::string name = std::filesystem::path(left->scene_path).filename().string();
   panel_.question().ask("Recover unsaved changes",
                         "Cumulet ended without saving " + (name.empty() ? "a new scene" : name) +
-                            ". Open the copy of " + time_of(left->path) + "?",
+                            ". Open the copy of " + written_text(left->path) + "?",
                         {{"Recover", "Opens the copy. It is not saved yet.", Command{Action::recover}},
                          {"Discard", "Deletes the copy.", Command{Action::discard_recovery}},
                          {"Later", "Asks again at the next start (Escape).", std::nullopt}});

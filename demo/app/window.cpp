@@ -1,5 +1,7 @@
 #include "window.hpp"
 
+#include <dlfcn.h>
+
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <backends/imgui_impl_glfw.h>
@@ -7,7 +9,9 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <iterator>
 #include <span>
 #include <stdexcept>
@@ -165,6 +169,16 @@ void Window::resize(int width, int height) {
   const auto [across, down] = pixels_per_unit();
   glfwSetWindowSize(window_.get(), static_cast<int>(std::lround(width / across)),
                     static_cast<int>(std::lround(height / down)));
+}
+
+std::string Window::portal_name() const {
+  // GLFW's build for Wayland lacks the function.
+  using GetX11Window = unsigned long(GLFWwindow*);
+  auto* const get = reinterpret_cast<GetX11Window*>(::dlsym(RTLD_DEFAULT, "glfwGetX11Window"));
+  if (get == nullptr) return "";
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "x11:%lx", get(window_.get()));
+  return text.data();
 }
 
 void Window::set_title(const std::string& title) {

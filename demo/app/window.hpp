@@ -31,6 +31,8 @@ class Window {
 
   [[nodiscard]] std::pair<int, int> size() const;
   void resize(int width, int height);
+  /// Returns the name by which the desktop's portal knows the window; "" if it has none.
+  [[nodiscard]] std::string portal_name() const;
   void set_title(const std::string& title);
   /// Returns the user interface scale for this screen; 1 on an ordinary screen.
   [[nodiscard]] float content_scale() const;

@@ -5,8 +5,12 @@
 #include <imgui_internal.h>
 
 #include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -218,6 +222,45 @@ TEST_P(PanelTest, DialogListsOnlyItsFileTypes) {
   for (int i = 0; i < 3; ++i) frame();
   EXPECT_TRUE(offers("cloud.vdb")) << "what is added is opened, not saved";
   EXPECT_FALSE(offers("sky.HDR"));
+}
+
+TEST_P(PanelTest, DialogIsTheDesktopsOrElseTheOwn) {
+  const cumulet::test::Folder folder;
+  const auto script = [&](const std::string& text) {
+    const auto path = folder / "dialog";
+    std::ofstream(path) << "#!/bin/sh\n" << text << "\n";
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+    return path.string();
+  };
+  const auto until_it_ends = [&] {
+    for (int i = 0; i < 6000 && panel_.dialog().waits(); ++i) {
+      frame();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    frame();
+  };
+  const std::string cloud = (folder / "cloud.vdb").string();
+  std::ofstream(cloud) << "x";
+  panel_.dialog().use_desktop(script("echo " + cloud), "");
+  panel_.dialog().open("Open", Action::open, {".vdb"}, folder.path().string());
+  EXPECT_TRUE(panel_.dialog().is_open());
+  until_it_ends();
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_EQ(commands_[0].text, cloud);
+  EXPECT_FALSE(panel_.dialog().is_open());
+
+  commands_.clear();
+  panel_.dialog().use_desktop(script("exit 1"), "");
+  panel_.dialog().open("Open", Action::open, {".vdb"}, folder.path().string());
+  until_it_ends();
+  EXPECT_FALSE(panel_.dialog().is_open()) << "the user has closed it";
+
+  panel_.dialog().use_desktop(script("echo no portal >&2; exit 3"), "");
+  panel_.dialog().open("Open", Action::open, {".vdb"}, folder.path().string());
+  until_it_ends();
+  frame();
+  EXPECT_TRUE(panel_.ui().controls().contains("cloud.vdb")) << "the own dialog is shown";
+  EXPECT_TRUE(commands_.empty());
 }
 
 TEST_P(PanelTest, SceneWithOnlyAModelIsListedAndSaved) {

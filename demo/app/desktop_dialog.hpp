@@ -1,0 +1,59 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace cumulet::demo {
+
+/// The desktop's own file dialog, which the program cumulet-file-dialog shows through the desktop's portal. All calls
+/// from one thread.
+class DesktopDialog {
+ public:
+  struct Request {
+    bool saves = false;
+    std::string title;
+    std::string parent;                   // window above which it opens, such as "x11:1a2b"; "": none
+    std::string folder;                   // "": the desktop's choice
+    std::string name;                     // suggested file name when saving
+    std::vector<std::string> extensions;  // of the listed files
+  };
+  struct Result {
+    enum class Outcome { chosen, closed, failed };
+    Outcome outcome = Outcome::failed;
+    std::string path;   // if chosen
+    std::string cause;  // if failed, one line
+  };
+
+  /// program: path of cumulet-file-dialog.
+  explicit DesktopDialog(std::string program) : program_(std::move(program)) {}
+  DesktopDialog(const DesktopDialog&) = delete;
+  DesktopDialog& operator=(const DesktopDialog&) = delete;
+  /// Closes the dialog if it is open.
+  ~DesktopDialog() { close(); }
+
+  /// Returns false if the program cannot be started. The dialog must not be open.
+  [[nodiscard]] bool open(const Request& request);
+  [[nodiscard]] bool is_open() const { return process_.has_value(); }
+  /// Returns the result once. Call it repeatedly while the dialog is open.
+  [[nodiscard]] std::optional<Result> take();
+  void close();
+
+ private:
+  struct Process {
+    pid_t id;
+    int output;  // read end of a pipe
+    int errors;
+  };
+  [[nodiscard]] Result end(int status);
+
+  std::string program_;
+  std::optional<Process> process_;  // nullopt: the dialog is closed
+};
+
+/// Returns the path of cumulet-file-dialog, which is beside this program or in its installation; "" if it is absent.
+[[nodiscard]] std::string desktop_dialog_program();
+
+}  // namespace cumulet::demo
