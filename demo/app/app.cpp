@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <file.hpp>
 #include <filesystem>
 #include <image.hpp>
@@ -18,6 +19,7 @@
 #include <program.hpp>
 #include <settings.hpp>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -110,7 +112,8 @@ double App::patience() const {
   if (now_ - last_event_ < event_emissive) return std::min(wait, emissive_frame);
   constexpr double blink = 0.4;
   constexpr double slow_frame = 0.1;
-  if (samples_.files.writes() || panel_.dialog().waits()) wait = std::min(wait, slow_frame);
+  if (samples_.files.writes() || panel_.dialog().waits() || recent_.thumbnails.works())
+    wait = std::min(wait, slow_frame);
   if (ImGui::GetIO().WantTextInput) wait = std::min(wait, blink);
   for (const Message& message : model_.messages)
     if (!message.error) wait = std::min(wait, std::max(message.until - now_, slow_frame));
@@ -161,6 +164,7 @@ void App::frame() {
   take_thumbnail();
   follow_renders();
   follow_samples();
+  follow_recent();
   model_.seconds_left = measurements_.seconds_left();
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
@@ -470,6 +474,32 @@ void App::make_sample_cards() {
     const Thumbnail picture{image::decode_png(sample.picture, sample.scene).rgba};
     samples_.textures.push_back(std::make_unique<ThumbnailTexture>(*gl_, picture));
     model_.samples.push_back({sample.label, sample.tip, sample.scene, samples_.textures.back()->name()});
+  }
+}
+
+void App::follow_recent() {
+  if (replay_.player) return;  // whose pictures do not depend on a cache
+  if (model_.status.has_content || exchange_.waiting()) {
+    recent_.thumbnails.stop();
+    return;
+  }
+  recent_.thumbnails.follow(listed_files(model_.preferences));
+  model_.recent_textures.clear();
+  for (const std::string& file : listed_files(model_.preferences)) {
+    const std::string picture = recent_.thumbnails.find(file);
+    if (picture.empty()) continue;
+    auto& texture = recent_.textures[picture];
+    try {
+      if (!texture) {
+        const image::PngPixels pixels = image::decode_png(image::read_file(picture), picture);
+        texture = std::make_unique<ThumbnailTexture>(*gl_, pixels.rgba, pixels.width, pixels.height);
+      }
+      model_.recent_textures[file] = texture->name();
+    } catch (const std::exception&) {
+      // A damaged thumbnail is made again at the next start.
+      std::error_code error;
+      std::filesystem::remove(picture, error);
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,7 @@
 #include "panel.hpp"
 #include "picture_renderer.hpp"
 #include "preferences.hpp"
+#include "recent_thumbnails.hpp"
 #include "replay.hpp"
 #include "samples.hpp"
 #include "sequence_clock.hpp"
@@ -64,6 +66,8 @@ class App {
   /// Opens a sample scene when its files are written.
   void open_sample(const std::string& scene);
   void follow_samples();
+  /// Makes and shows the thumbnails of recent files while the window is empty.
+  void follow_recent();
   void make_sample_cards();
   void open_dropped(const std::vector<std::string>& files);
   /// Says that a volume stands on its Z axis, with a button for the Y axis. further: the file of a further volume, ""
@@ -165,6 +169,10 @@ class App {
     SampleFiles files{sample_program(), sample_folder()};
     std::vector<std::unique_ptr<ThumbnailTexture>> textures;
   } samples_;
+  struct Recent {
+    RecentThumbnails thumbnails{thumbnail_program(), thumbnail_folder()};
+    std::map<std::string, std::unique_ptr<ThumbnailTexture>> textures;  // by the path of the thumbnail
+  } recent_;
   Timeline timeline_;  // used with --trace
   std::unique_ptr<Renderer> renderer_;
   PictureRenderer pictures_;

@@ -9,11 +9,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace cumulet::demo {
 namespace {
 
-constexpr std::size_t max_recent = 6;
 constexpr float wanted_width = 560.0f;
 constexpr float title_scale = 2.4f;
 
@@ -32,47 +32,83 @@ void draw_centered(const char* text) {
   ImGui::TextUnformatted(text);
 }
 
+/// Returns the OpenGL texture as ImGui's.
+ImTextureID texture_id(unsigned name) {
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
+  return reinterpret_cast<ImTextureID>(std::uintptr_t{name});
+}
+
+/// A picture to click on, with lines of text below.
+struct Card {
+  std::string control;
+  std::string tip;
+  unsigned texture = 0;  // 0: an empty frame
+  std::vector<std::string> lines;
+};
+
+/// Returns true if the card was clicked.
+bool draw_card(Ui& ui, const Card& card, ImVec2 size) {
+  const float line = ImGui::GetTextLineHeightWithSpacing();
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const ImVec2 end(corner.x + size.x, corner.y + size.y);
+  const auto lines = static_cast<float>(card.lines.size());
+  const bool clicked = ImGui::InvisibleButton(("##" + card.control).c_str(), {size.x, size.y + lines * line});
+  const bool hovered = ImGui::IsItemHovered();
+  ui.remember(card.control.c_str(), card.tip.c_str());
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  const float round = ui.px(4.0f);
+  if (card.texture != 0)
+    list.AddImageRounded(texture_id(card.texture), corner, end, {0.0f, 0.0f}, {1.0f, 1.0f}, IM_COL32_WHITE, round);
+  else
+    list.AddRectFilled(corner, end, IM_COL32(255, 255, 255, 12), round);
+  if (hovered) list.AddRect(corner, end, ImGui::GetColorU32(ImGuiCol_Text, 0.8f), round, 0, ui.px(1.5f));
+  float y = end.y + ui.px(2.0f);
+  for (const std::string& text : card.lines) {
+    const bool first = &text == card.lines.data();
+    list.AddText({corner.x + ui.px(2.0f), y},
+                 ImGui::GetColorU32(hovered && first ? ImGuiCol_Text : ImGuiCol_TextDisabled), text.c_str());
+    y += line;
+  }
+  return clicked;
+}
+
+/// Returns the width of each of `count` cards in a row.
+float card_width(std::size_t count) {
+  const auto cards = static_cast<float>(count);
+  return (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x * (cards - 1.0f)) / cards;
+}
+
 void draw_samples(Ui& ui, const Model& model, std::vector<Command>& commands) {
   if (model.samples.empty()) return;
-  const float gap = ImGui::GetStyle().ItemSpacing.x;
-  const auto count = static_cast<float>(model.samples.size());
-  const float width = (ImGui::GetContentRegionAvail().x - gap * (count - 1.0f)) / count;
-  const float label = ImGui::GetTextLineHeightWithSpacing();
+  const float width = card_width(model.samples.size());
   for (const SampleCard& sample : model.samples) {
     if (&sample != model.samples.data()) ImGui::SameLine();
-    const ImVec2 corner = ImGui::GetCursorScreenPos();
-    const ImVec2 end(corner.x + width, corner.y + std::round(0.5f * width));
-    const std::string control = std::string("Start/") + sample.label;
-    if (ImGui::InvisibleButton(("##" + control).c_str(), {width, end.y - corner.y + label}))
-      commands.push_back({Action::open_sample, sample.scene});
-    const bool hovered = ImGui::IsItemHovered();
-    ui.remember(control.c_str(), sample.tip);
-    ImDrawList& list = *ImGui::GetWindowDrawList();
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): so ImGui has textures
-    auto* picture = reinterpret_cast<ImTextureID>(std::uintptr_t{sample.texture});
-    const float round = ui.px(4.0f);
-    list.AddImageRounded(picture, corner, end, {0.0f, 0.0f}, {1.0f, 1.0f}, IM_COL32_WHITE, round);
-    if (hovered) list.AddRect(corner, end, ImGui::GetColorU32(ImGuiCol_Text, 0.8f), round, 0, ui.px(1.5f));
-    list.AddText({corner.x + ui.px(2.0f), end.y + ui.px(2.0f)},
-                 ImGui::GetColorU32(hovered ? ImGuiCol_Text : ImGuiCol_TextDisabled), sample.label);
+    const Card card{std::string("Start/") + sample.label, sample.tip, sample.texture, {sample.label}};
+    if (draw_card(ui, card, {width, std::round(0.5f * width)})) commands.push_back({Action::open_sample, sample.scene});
   }
   ImGui::Spacing();
 }
 
 void draw_recent(Ui& ui, const Model& model, std::vector<Command>& commands) {
-  const std::vector<std::string>& recent = model.preferences.recent;
+  const auto recent = listed_files(model.preferences);
   if (recent.empty()) return;
   ImGui::Spacing();
   ImGui::Separator();
   Ui::heading("Recent");
-  for (std::size_t i = 0; i < std::min(recent.size(), max_recent); ++i) {
-    const std::string name = std::filesystem::path(recent[i]).filename().string();
-    if (Ui::entry(name, i, false)) commands.push_back({Action::open, recent[i]});
-    ui.remember(("Start/" + name).c_str(), recent[i].c_str());
-    const char* const kind = kind_of_file(recent[i]);
-    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(kind).x);
-    Ui::heading(kind);
+  const float width = card_width(max_listed_files);
+  for (const std::string& file : recent) {
+    if (&file != recent.data()) ImGui::SameLine();
+    const std::string name = std::filesystem::path(file).filename().string();
+    const auto texture = model.recent_textures.find(file);
+    const Card card{"Start/" + name,
+                    file,
+                    texture != model.recent_textures.end() ? texture->second : 0U,
+                    {end_of(name, width), kind_of_file(file)}};
+    ImGui::PushID(file.c_str());  // files of one name
+    if (draw_card(ui, card, {width, width})) commands.push_back({Action::open, file});
+    ImGui::PopID();
   }
+  ImGui::Spacing();
 }
 
 }  // namespace

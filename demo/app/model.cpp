@@ -11,6 +11,7 @@
 #include <numbers>
 #include <program.hpp>
 #include <settings.hpp>
+#include <span>
 #include <system_error>
 #include <utility>
 
@@ -190,6 +191,10 @@ cumulet_sun_sky_desc daylight() {
 
 void take_daylight(SceneOptions& scene) {
   if (settings::same(scene.light, daylight())) scene.light = spelled_out({});
+}
+
+std::span<const std::string> listed_files(const Preferences& preferences) {
+  return std::span(preferences.recent).first(std::min(preferences.recent.size(), max_listed_files));
 }
 
 void give_daylight(SceneOptions& scene) {

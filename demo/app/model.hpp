@@ -6,9 +6,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <frame_row.hpp>
+#include <map>
 #include <memory>
 #include <optional>
 #include <scene_file.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -242,6 +244,10 @@ struct SampleCard {
   unsigned texture = 0;  // OpenGL name of its picture in the window's context
 };
 
+inline constexpr std::size_t max_listed_files = 6;
+/// Returns the recent files that the empty window lists.
+[[nodiscard]] std::span<const std::string> listed_files(const Preferences& preferences);
+
 /// All data that the user interface shows and edits.
 struct Model {
   SceneOptions scene;            // defaults are replaced by their values, except for the camera's position
@@ -264,7 +270,8 @@ struct Model {
   std::vector<GridInfo> grids;
   Status status;
   std::vector<SampleCard> samples;
-  unsigned thumbnail_texture = 0;  // OpenGL name of status.thumbnail in the window's context; 0: none
+  std::map<std::string, unsigned> recent_textures;  // of listed files' thumbnails: OpenGL names in the window's context
+  unsigned thumbnail_texture = 0;                   // OpenGL name of status.thumbnail in the window's context; 0: none
   Charts charts;
   std::optional<double> seconds_left;  // until the image has all samples; nullopt if that is unknown
   std::vector<Message> messages;

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace cumulet::demo {
+
+/// Thumbnails of recent files. `cumulet-render --thumbnail` makes the missing ones in the background, one after
+/// another, and they are kept in a folder until their files change. All calls from one thread.
+class RecentThumbnails {
+ public:
+  static constexpr int side = 256;  // pixels
+
+  /// program: path of cumulet-render; folder: of the thumbnails. "" for either one: there are no thumbnails.
+  RecentThumbnails(std::string program, std::string folder);
+  RecentThumbnails(const RecentThumbnails&) = delete;
+  RecentThumbnails& operator=(const RecentThumbnails&) = delete;
+  /// Ends the program if it runs.
+  ~RecentThumbnails();
+
+  /// Begins the next missing thumbnail of these files. Call it repeatedly. Returns true if there may be a new one.
+  bool follow(std::span<const std::string> files);
+  /// Ends the current thumbnail's rendering, for example because the user has opened a file. It is begun again later.
+  void stop();
+  [[nodiscard]] bool works() const { return making_.has_value(); }
+  /// Returns the path of the file's thumbnail; "" if there is none yet.
+  [[nodiscard]] std::string find(const std::string& file) const;
+
+ private:
+  struct Making {
+    pid_t process;
+    std::string file;
+    std::string picture;     // complete when it has this name
+    std::string unfinished;  // name until then
+  };
+  // Returns the path that the file's thumbnail has or gets; "" for a file that is missing or of another kind.
+  [[nodiscard]] std::string path_for(const std::string& file) const;
+  void begin(const std::string& file, const std::string& picture);
+
+  std::string program_;
+  std::string folder_;
+  std::optional<Making> making_;
+  std::map<std::string, std::string> failed_;  // file and the path of the thumbnail that could not be made
+};
+
+/// Returns the path of cumulet-render, in the folder of this program; "" if it is not there.
+[[nodiscard]] std::string thumbnail_program();
+/// Returns the folder of the thumbnails for the user; "" if there is none.
+[[nodiscard]] std::string thumbnail_folder();
+
+}  // namespace cumulet::demo

@@ -1,0 +1,112 @@
+// Thumbnails of recent files, made by a program in place of cumulet-render.
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "recent_thumbnails.hpp"
+#include "support/folder.hpp"
+
+namespace {
+
+using namespace cumulet::demo;
+namespace fs = std::filesystem;
+
+class RecentThumbnailsTest : public testing::Test {
+ protected:
+  /// Writes a file and returns its path.
+  std::string file(const std::string& name, const std::string& content = "x") {
+    std::ofstream(folder_ / name) << content;
+    return (folder_ / name).string();
+  }
+  /// Returns the path of a shell script. Its arguments are: --thumbnail 256 -o PICTURE [--scene] FILE.
+  std::string script(const std::string& commands) {
+    const std::string path = file("cumulet-render", "#!/bin/sh\necho \"$@\" >>\"$0.calls\"\n" + commands + '\n');
+    fs::permissions(path, fs::perms::owner_all);
+    return path;
+  }
+  static void finish(RecentThumbnails& thumbnails, const std::vector<std::string>& files) {
+    do {
+      thumbnails.follow(files);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    } while (thumbnails.works());
+  }
+  [[nodiscard]] int calls() const {
+    std::ifstream stream(folder_ / "cumulet-render.calls");
+    int lines = 0;
+    for (std::string line; std::getline(stream, line);) ++lines;
+    return lines;
+  }
+
+  cumulet::test::Folder folder_;
+  std::string cache_ = (folder_ / "cache/thumbnails").string();
+};
+
+TEST_F(RecentThumbnailsTest, AreMadeOnceForVolumesModelsAndScenes) {
+  const std::string program = script("echo \"$@\" >\"$4\"");
+  const std::vector<std::string> files = {file("a.vdb"), file("b.glb"), file("c.json"), file("d.hdr"),
+                                          (folder_ / "gone.vdb").string()};
+  for (int i = 0; i < 2; ++i) {
+    RecentThumbnails thumbnails(program, cache_);
+    EXPECT_EQ(thumbnails.find(files[0]).empty(), i == 0);
+    finish(thumbnails, files);
+    for (int j = 0; j < 3; ++j) EXPECT_TRUE(fs::exists(thumbnails.find(files[j]))) << files[j];
+    EXPECT_EQ(thumbnails.find(files[3]), "") << "environments have none";
+    EXPECT_EQ(thumbnails.find(files[4]), "");
+    std::string line;
+    std::getline(std::ifstream(thumbnails.find(files[2])), line);
+    EXPECT_TRUE(line.ends_with("--scene " + files[2])) << line;
+  }
+  EXPECT_EQ(calls(), 3);
+}
+
+TEST_F(RecentThumbnailsTest, AChangedFileHasANewOne) {
+  RecentThumbnails thumbnails(script("cat \"$5\" >\"$4\""), cache_);
+  const std::vector<std::string> files = {file("a.vdb", "first")};
+  finish(thumbnails, files);
+  const std::string first = thumbnails.find(files[0]);
+  file("a.vdb", "second");
+  EXPECT_EQ(thumbnails.find(files[0]), "");
+  finish(thumbnails, files);
+  EXPECT_NE(thumbnails.find(files[0]), first);
+}
+
+TEST_F(RecentThumbnailsTest, AFailureIsNotRepeatedForTheSameContent) {
+  RecentThumbnails thumbnails(script("echo part >\"$4\"; exit 1"), cache_);
+  const std::vector<std::string> files = {file("damaged.vdb"), file("other.vdb")};
+  for (int i = 0; i < 3; ++i) finish(thumbnails, files);
+  EXPECT_EQ(calls(), 2);
+  EXPECT_EQ(thumbnails.find(files[0]), "");
+  file("damaged.vdb", "mended");
+  finish(thumbnails, files);
+  EXPECT_EQ(calls(), 3);
+}
+
+TEST_F(RecentThumbnailsTest, StoppingEndsTheProgramAndLeavesNothing) {
+  RecentThumbnails thumbnails(script("echo part >\"$4\"; exec sleep 60"), cache_);
+  const std::vector<std::string> files = {file("a.vdb")};
+  thumbnails.follow(files);
+  while (fs::is_empty(cache_)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_TRUE(thumbnails.works());
+  thumbnails.stop();
+  EXPECT_FALSE(thumbnails.works());
+  EXPECT_TRUE(fs::is_empty(cache_));
+}
+
+TEST_F(RecentThumbnailsTest, WithoutProgramOrFolderThereAreNone) {
+  const std::vector<std::string> files = {file("a.vdb")};
+  RecentThumbnails no_program("", cache_);
+  RecentThumbnails no_folder(script("exit 0"), "");
+  for (RecentThumbnails* thumbnails : {&no_program, &no_folder}) {
+    finish(*thumbnails, files);
+    EXPECT_EQ(thumbnails->find(files[0]), "");
+  }
+  EXPECT_EQ(calls(), 0);
+}
+
+}  // namespace
