@@ -52,7 +52,7 @@ App::App(DemoOptions options)
   model_.navigation.style = model_.preferences.style;
   derived_.exposure_given = options_.exposure_given;
   meter_after_load();
-  changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds);
+  changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds, model_.scene);
   if (!options_.replay.empty())
     replay_.player.emplace(parse_replay(image::read_file(options_.replay), options_.replay), options_.replay);
   if (!options_.trace.empty()) image::check_writable(options_.trace);
@@ -296,7 +296,12 @@ void App::ask() {
 }
 
 void App::take() {
-  if (const auto answer = renderer_->take()) accept(*answer);
+  const auto answer = renderer_->take();
+  if (!answer) return;
+  const SceneOptions before = model_.scene;
+  accept(*answer);
+  changes_->take_program_change(before, model_.scene);
+  if (answer->metered) take_exposure(*answer->metered);
 }
 
 void App::accept(const Answer& answer) {
@@ -351,7 +356,6 @@ void App::accept(const Answer& answer) {
     if (shown > 1 && !clear && !burns()) panel_.picker().open(model_.scene.volume, Window::wake);
   }
   if (!exchange_.waiting()) loading_.starting = false;
-  if (answer.metered) take_exposure(*answer.metered);
   if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }
 
@@ -381,11 +385,12 @@ void App::take_exposure(const Metered& metered) {
   if (!asked) {
     const bool chosen = derived_.exposure_given || !is_default_exposure(model_.scene, derived_.exposure);
     if (chosen || std::abs(*metered.stops - stops) < tolerance) return;
-    // A file that is only viewed needs no saving.
-    if (!model_.modified) changes_->reset();
   }
+  const SceneOptions before = model_.scene;
   stops = *metered.stops;
   derived_.exposure = stops;
+  // The user's request is a change, the measurement after a load is none.
+  if (!asked) changes_->take_program_change(before, model_.scene);
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "Auto exposure: %+.1f stops", static_cast<double>(stops));
   show_message(model_, false, text.data(), now_);

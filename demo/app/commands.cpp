@@ -319,7 +319,7 @@ void App::open(const std::string& path) {
   }
   meter_after_load();
   // A file that is only viewed needs no saving.
-  if (!keeps && file_count(model_.scene) == 1) changes_->reset();
+  if (!keeps && file_count(model_.scene) == 1) changes_->reset(model_.scene);
 }
 
 void App::open_sample(const std::string& scene) {

@@ -17,17 +17,19 @@ void copy_view(const SceneCamera& from, SceneCamera& to) {
   to.camera_close = from.camera_close;
 }
 
+bool differs(const SceneOptions& saved, SceneOptions scene) {
+  copy_view(saved, scene);
+  return !same_scene(saved, scene);
+}
+
 }  // namespace
 
-void UnsavedChanges::follow(const SceneOptions& scene, bool loads, double now) {
-  if (!saved_ && !loads) saved_ = scene;
-  bool changed = false;
-  if (saved_) {
-    SceneOptions seen = scene;
-    copy_view(*saved_, seen);
-    changed = !same_scene(*saved_, seen);
-  }
-  if (changed) {
+void UnsavedChanges::take_program_change(const SceneOptions& before, const SceneOptions& after) {
+  if (!differs(saved_, before)) saved_ = after;
+}
+
+void UnsavedChanges::follow(const SceneOptions& scene, double now) {
+  if (differs(saved_, scene)) {
     if (!due_) due_ = now + interval_;
     return;
   }

@@ -3,6 +3,7 @@
 #include <optional>
 #include <scene_file.hpp>
 #include <string>
+#include <utility>
 
 #include "recovery_file.hpp"
 
@@ -12,15 +13,17 @@ namespace cumulet::demo {
 /// file. Orbiting, panning and dollying are no changes, but the recovery file has the current camera.
 class UnsavedChanges {
  public:
-  /// folder: of the recovery file; "": none. interval: seconds between two copies.
-  UnsavedChanges(const std::string& folder, double interval) : recovery_(folder), interval_(interval) {}
+  /// folder: of the recovery file; "": none. interval: seconds between two copies. scene: the current scene.
+  UnsavedChanges(const std::string& folder, double interval, SceneOptions scene)
+      : recovery_(folder), interval_(interval), saved_(std::move(scene)) {}
 
-  /// The scene is an opened one, and has no changes when it is loaded.
-  void reset() { saved_.reset(); }
-  /// The scene has the changes since `scene`, or none.
-  void reset(const SceneOptions& scene) { saved_ = scene; }
-  /// Compares the scene with the saved one. loads: files are still loading. now: in seconds.
-  void follow(const SceneOptions& scene, bool loads, double now);
+  /// The scene has the changes since `saved`.
+  void reset(const SceneOptions& saved) { saved_ = saved; }
+  /// The program itself has changed the scene, for example because a file has been loaded. That is no unsaved change
+  /// unless the user has changed the scene before.
+  void take_program_change(const SceneOptions& before, const SceneOptions& after);
+  /// Compares the scene with the saved one. now: in seconds.
+  void follow(const SceneOptions& scene, double now);
   [[nodiscard]] bool any() const { return due_.has_value(); }
 
   /// Returns the time of the next copy; nullopt if there are no changes.
@@ -32,7 +35,7 @@ class UnsavedChanges {
  private:
   RecoveryFile recovery_;
   double interval_;
-  std::optional<SceneOptions> saved_;   // nullopt: the scene is loading
+  SceneOptions saved_;
   std::optional<SceneOptions> copied_;  // scene in the recovery file
   std::optional<double> due_;           // time of the next copy; nullopt: there are no changes
 };

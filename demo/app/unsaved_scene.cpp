@@ -45,7 +45,7 @@ void App::show(SceneOptions scene, const std::string& path) {
   deselect(model_);
   loading_.reload = true;
   loading_.fit = needs_fit(model_.scene.camera);
-  changes_->reset();
+  changes_->reset(model_.scene);
 }
 
 void App::new_scene() {
@@ -144,7 +144,7 @@ void App::recover() {
 
 void App::autosave() {
   if (!panel_.dialog_open()) loading_.waiting.clear();
-  if (!held_) changes_->follow(model_.scene, exchange_.waiting() || !exchange_.settled(), now_);
+  if (!held_) changes_->follow(model_.scene, now_);
   model_.modified = changes_->any();
   if (held_) return;
   try {

@@ -70,34 +70,56 @@ TEST(RecoveryFileTest, NoFolderIsNoError) {
 }
 
 TEST(UnsavedChangesTest, AreThoseOfTheSceneAndNotOfTheView) {
-  UnsavedChanges changes("", 60.0);
   SceneOptions scene;
   scene.camera.eye[2] = 5.0;
-  changes.follow(scene, true, 0.0);
-  scene.volume = "/a/cloud.vdb";
-  changes.follow(scene, false, 1.0);
-  EXPECT_FALSE(changes.any()) << "changes while the file is loaded are not the user's";
+  UnsavedChanges changes("", 60.0, scene);
   scene.camera.eye[0] = 3.0;
-  changes.follow(scene, false, 2.0);
+  changes.follow(scene, 2.0);
   EXPECT_FALSE(changes.any());
   scene.camera.fovy_degrees = 20.0;
-  changes.follow(scene, false, 3.0);
+  changes.follow(scene, 3.0);
   EXPECT_TRUE(changes.any());
   EXPECT_EQ(changes.due(), 63.0);
   scene.camera.fovy_degrees = 0.0;
-  changes.follow(scene, false, 4.0);
+  changes.follow(scene, 4.0);
   EXPECT_FALSE(changes.any()) << "an undone change is none";
   changes.reset(bright());
-  changes.follow(scene, false, 5.0);
+  changes.follow(scene, 5.0);
+  EXPECT_TRUE(changes.any());
+}
+
+TEST(UnsavedChangesTest, AreTheUsersAlone) {
+  SceneOptions scene;
+  UnsavedChanges changes("", 60.0, scene);
+  SceneOptions loaded = scene;
+  loaded.volume = "/a/cloud.vdb";
+  loaded.medium.density_scale = 2.0;
+  changes.take_program_change(scene, loaded);
+  changes.follow(loaded, 1.0);
+  EXPECT_FALSE(changes.any()) << "loading a file changes the scene";
+  SceneOptions brighter = loaded;
+  brighter.display.exposure_stops = 0.5f;
+  changes.follow(brighter, 2.0);
+  EXPECT_TRUE(changes.any());
+}
+
+TEST(UnsavedChangesTest, OfTheUserRemainWhenALoadEndsLater) {
+  SceneOptions edited;
+  UnsavedChanges changes("", 60.0, edited);
+  edited.display.exposure_stops = 0.5f;
+  SceneOptions loaded = edited;
+  loaded.medium.density_scale = 2.0;
+  changes.take_program_change(edited, loaded);
+  changes.follow(loaded, 1.0);
   EXPECT_TRUE(changes.any());
 }
 
 TEST(UnsavedChangesTest, AreCopiedWhenDue) {
   const cumulet::test::Folder folder;
   const auto copy = folder / "recovery-1.json";
-  UnsavedChanges changes(folder.path().string(), 60.0);
-  changes.follow(SceneOptions(), false, 0.0);
-  changes.follow(bright(), false, 10.0);
+  UnsavedChanges changes(folder.path().string(), 60.0, SceneOptions());
+  changes.follow(SceneOptions(), 0.0);
+  changes.follow(bright(), 10.0);
   changes.autosave(bright(), "", 69.0);
   EXPECT_FALSE(std::filesystem::exists(copy));
   changes.autosave(bright(), "", 70.0);
@@ -106,7 +128,7 @@ TEST(UnsavedChangesTest, AreCopiedWhenDue) {
   std::ofstream(copy) << "old";
   changes.autosave(bright(), "", 130.0);
   EXPECT_EQ(cumulet::image::read_file(copy.string()), "old") << "the same scene is not written again";
-  changes.follow(SceneOptions(), false, 131.0);
+  changes.follow(SceneOptions(), 131.0);
   EXPECT_FALSE(std::filesystem::exists(copy)) << "without changes there is no copy";
 }
 
