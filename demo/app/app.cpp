@@ -163,7 +163,7 @@ void App::frame() {
   take_thumbnail();
   follow_renders();
   follow_samples();
-  model_.seconds_left = measurements_.seconds_left();
+  model_.seconds_left = measurements_.seconds_left(model_.scene.sampling);
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
   execute(commands);
