@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <default_look.hpp>
 #include <exception>
 #include <file.hpp>
 #include <filesystem>
@@ -165,7 +166,7 @@ void App::frame() {
   follow_renders();
   follow_samples();
   follow_recent();
-  model_.seconds_left = measurements_.seconds_left();
+  model_.seconds_left = measurements_.seconds_left(model_.scene.sampling);
   std::vector<Command> commands;
   panel_.draw(model_, ui_scale_, now_, commands);
   execute(commands);
@@ -378,7 +379,6 @@ void App::take_look(const cumulet_medium_desc& look) {
 }
 
 void App::take_exposure(const Metered& metered) {
-  constexpr float tolerance = 0.5f;  // stops
   const bool asked = std::exchange(derived_.exposure_asked, false);
   float& stops = model_.scene.display.exposure_stops;
   if (!metered.stops) {
@@ -387,7 +387,7 @@ void App::take_exposure(const Metered& metered) {
   }
   if (!asked) {
     const bool chosen = derived_.exposure_given || !is_default_exposure(model_.scene, derived_.exposure);
-    if (chosen || std::abs(*metered.stops - stops) < tolerance) return;
+    if (chosen || std::abs(*metered.stops - stops) < exposure_tolerance) return;
   }
   const SceneOptions before = model_.scene;
   stops = *metered.stops;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <default_look.hpp>
 #include <exception>
 #include <info.hpp>
 #include <string>

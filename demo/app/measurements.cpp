@@ -36,7 +36,8 @@ void Measurements::take_status(const Status& status, std::uint64_t drawn, double
   constexpr double rate_period = 0.5;
   const bool more = (status.frame.flags & CUMULET_RENDER_INCOMPLETE) != 0;
   const bool preview = (status.frame.flags & CUMULET_RENDER_PREVIEW) != 0;
-  if (more && !preview && status.frame.progress > 0.0)
+  // The first sample takes longer: the sizes of dispatches are still unknown.
+  if (more && !preview && status.frame.width > 0 && status.frame.progress > 0.0)
     time_left_.see(status.frame.progress, now);
   else
     time_left_.rest();
@@ -53,8 +54,8 @@ void Measurements::take_status(const Status& status, std::uint64_t drawn, double
   }
 }
 
-std::optional<double> Measurements::seconds_left() const {
-  const auto seconds = time_left_.seconds();
+std::optional<double> Measurements::seconds_left(const cumulet_sampling_desc& sampling) const {
+  const auto seconds = time_left_.seconds(part_of_a_sample(sampling));
   return seconds ? std::optional(std::ceil(*seconds)) : std::nullopt;
 }
 

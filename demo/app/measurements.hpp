@@ -24,8 +24,9 @@ class Measurements {
   void take_frame(const std::vector<Event>& events, bool drawn, bool picture, bool due, bool pending);
   /// Records the viewer's statistics. drawn: the latest request with a drawn image.
   void take_status(const Status& status, std::uint64_t drawn, double now);
-  /// Returns the seconds until the image has all samples, rounded up to whole seconds; nullopt if that is unknown.
-  [[nodiscard]] std::optional<double> seconds_left() const;
+  /// Returns the seconds until the image has all samples, rounded up to whole seconds; nullopt until a sample per pixel
+  /// was measured.
+  [[nodiscard]] std::optional<double> seconds_left(const cumulet_sampling_desc& sampling) const;
 
  private:
   Charts& charts_;

@@ -173,76 +173,8 @@ void open_surfaces(Model& model, const std::string& path) {
     model.scene.ground.mode = CUMULET_GROUND_NONE;
 }
 
-namespace {
-
-cumulet_sun_sky_desc spelled_out(const SceneOptions& given) {
-  SceneOptions scene = given;
-  spell_out_defaults(scene);
-  return scene.light;
-}
-
-cumulet_sun_sky_desc daylight() {
-  SceneOptions day;
-  day.set_daylight();
-  return spelled_out(day);
-}
-
-}  // namespace
-
-void take_daylight(SceneOptions& scene) {
-  if (settings::same(scene.light, daylight())) scene.light = spelled_out({});
-}
-
 std::span<const std::string> listed_files(const Preferences& preferences) {
   return std::span(preferences.recent).first(std::min(preferences.recent.size(), max_listed_files));
-}
-
-void give_daylight(SceneOptions& scene) {
-  if (settings::same(scene.light, spelled_out({}))) scene.light = daylight();
-}
-
-namespace {
-
-constexpr float dusk_exposure = 1.0f;  // stops
-
-// The sun is just above the horizon.
-cumulet_sun_sky_desc dusk() {
-  cumulet_sun_sky_desc light = daylight();
-  light.sun_elevation_degrees = 3.0f;
-  return light;
-}
-
-bool is_display(const SceneOptions& scene, float exposure, std::optional<float> measured, cumulet_tone_map tone_map) {
-  const float stops = scene.display.exposure_stops;
-  return (stops == exposure || stops == measured) && scene.display.tone_map == tone_map;
-}
-
-bool is_dusk(const SceneOptions& scene, std::optional<float> measured) {
-  return settings::same(scene.light, dusk()) && is_display(scene, dusk_exposure, measured, CUMULET_TONE_MAP_FILMIC);
-}
-
-}  // namespace
-
-bool is_default_exposure(const SceneOptions& scene, std::optional<float> measured) {
-  const float stops = scene.display.exposure_stops;
-  return stops == 0.0f || stops == measured || is_dusk(scene, measured);
-}
-
-bool take_dusk(SceneOptions& scene, std::optional<float> measured) {
-  if (!settings::same(scene.light, daylight()) || !scene.environment.empty()) return false;
-  if (!is_display(scene, 0.0f, measured, CUMULET_TONE_MAP_NEUTRAL)) return false;
-  scene.light = dusk();
-  scene.display.exposure_stops = dusk_exposure;
-  scene.display.tone_map = CUMULET_TONE_MAP_FILMIC;
-  return true;
-}
-
-bool give_day(SceneOptions& scene, std::optional<float> measured) {
-  if (!is_dusk(scene, measured)) return false;
-  scene.light = daylight();
-  scene.display.exposure_stops = 0.0f;
-  scene.display.tone_map = CUMULET_TONE_MAP_NEUTRAL;
-  return true;
 }
 
 namespace {

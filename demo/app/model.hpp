@@ -288,19 +288,6 @@ struct Model {
 /// their own.
 void open_surfaces(Model& model, const std::string& path);
 
-/// Removes the default daylight when an environment is opened, because that contains a sun. Sets it again when the
-/// environment is removed and there is no other sun or sky.
-void take_daylight(SceneOptions& scene);
-void give_daylight(SceneOptions& scene);
-/// Returns true if neither the user nor a scene file has set the exposure. measured: the exposure that was set by auto
-/// exposure, in stops, also below.
-[[nodiscard]] bool is_default_exposure(const SceneOptions& scene, std::optional<float> measured);
-/// Sets dusk light with the filmic tone map and a matching exposure, in which flames look bright, if the scene has the
-/// default daylight and display. Returns true if it did.
-bool take_dusk(SceneOptions& scene, std::optional<float> measured = std::nullopt);
-/// Sets the default daylight and display again if the scene has those of take_dusk. Returns true if it did.
-bool give_day(SceneOptions& scene, std::optional<float> measured = std::nullopt);
-
 /// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear
 /// after a while, those with a button later.
 void show_message(Model& model, bool error, const std::string& text, double now,

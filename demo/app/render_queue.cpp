@@ -115,7 +115,9 @@ void RenderQueue::report(std::uint64_t number, double part, const std::string& t
     if (job == nullptr) return;
     if (part > 0.0) time_left_.see(part, now);
     job->entry.part = std::clamp(part, 0.0, 1.0);
-    job->entry.seconds_left = time_left_.seconds();
+    const std::optional<PictureJob::Range>& frames = job->picture.frames;
+    const double pictures = frames ? static_cast<double>(frames->last) - static_cast<double>(frames->first) + 1.0 : 1.0;
+    job->entry.seconds_left = time_left_.seconds(part_of_a_sample(job->picture.scene.sampling) / pictures);
     job->entry.text = text;
     if (now - woken_at_ < wake_period) return;
     woken_at_ = now;

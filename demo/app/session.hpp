@@ -16,7 +16,7 @@
 #include <transforms.hpp>
 #include <vector>
 
-#include "auto_exposure.hpp"
+#include "exposure_meter.hpp"
 #include "given_settings.hpp"
 #include "model.hpp"
 #include "picture_job.hpp"

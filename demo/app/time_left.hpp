@@ -1,8 +1,13 @@
 #pragma once
 
+#include <cumulet/cumulet.h>
+
 #include <optional>
 
 namespace cumulet::demo {
+
+/// Returns the part of an image that one sample per pixel is. With a noise target it is the least part.
+[[nodiscard]] double part_of_a_sample(const cumulet_sampling_desc& sampling);
 
 /// Estimates the remaining time of a work from its completed fraction.
 class TimeLeft {
@@ -11,8 +16,9 @@ class TimeLeft {
   void see(double part, double now);
   /// Records that nothing is worked on.
   void rest() { start_.reset(); }
-  /// Returns the remaining seconds at the last call of see(); nullopt if too little is known.
-  [[nodiscard]] std::optional<double> seconds() const;
+  /// Returns the remaining seconds at the last call of see(); nullopt if too little is known. min_part: the part that
+  /// must have been completed since the first call, such as a whole sample.
+  [[nodiscard]] std::optional<double> seconds(double min_part) const;
 
  private:
   struct Point {

@@ -30,6 +30,7 @@
 #include "denoised.hpp"
 #include "early_pictures.hpp"
 #include "fire.hpp"
+#include "fire_look.hpp"
 #include "first_view.hpp"
 #include "frame_plan.hpp"
 #include "frame_report.hpp"
@@ -54,6 +55,7 @@ using cumulet::demo::check;
 using cumulet::demo::Checkpoint;
 using cumulet::demo::driver_of;
 using cumulet::demo::EarlyPictures;
+using cumulet::demo::FireLook;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
 using cumulet::demo::one_line;
@@ -120,21 +122,6 @@ void wait(const Viewer& viewer, Progress& progress) {
     cumulet_get_progress(viewer.get(), &state);
     if (state.stage > CUMULET_STAGE_LOADING) progress.stage("building the grid");
   }
-}
-
-/// Returns the default medium of a burning volume if the scene sets no medium; nullopt if the volume does not burn.
-std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
-  if (!scene.is_shown() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
-  return cumulet::demo::medium_of_fire(volume_of(viewer).get(), scene.medium);
-}
-
-void print_fire(const cumulet_medium_desc& medium, Progress& progress) {
-  std::array<char, 160> line{};
-  std::snprintf(
-      line.data(), line.size(),
-      "the volume burns: using --preset %s --flame-strength %g --blackbody %g (set any medium option to disable this)",
-      medium.density_scale > 0.0 ? "explosion" : "fire", double{medium.flame_strength}, double{medium.blackbody});
-  print_line(progress, line.data());
 }
 
 constexpr double draw_only_ms = -1.0;  // budget of a frame that traces no samples
@@ -313,7 +300,8 @@ std::string network_of(const RenderOptions& options, Progress& progress) {
 class Studio {
  public:
   explicit Studio(const RenderOptions& options)
-      : network_(network_of(options, progress_)),
+      : fire_look_(options.default_look),
+        network_(network_of(options, progress_)),
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
         viewer_(cumulet::demo::create_viewer(context_, messages_, options.trace.empty() ? nullptr : &timeline_,
@@ -324,6 +312,7 @@ class Studio {
 
   [[nodiscard]] Progress& progress() { return progress_; }
   [[nodiscard]] const Viewer& viewer() const { return viewer_; }
+  [[nodiscard]] FireLook& fire_look() { return fire_look_; }
 
   /// Loads the scene's volume and everything else, and waits for it. frame: the frame of a sequence, or null. Throws
   /// the cause of a failure.
@@ -343,8 +332,11 @@ class Studio {
     if (frame != nullptr) others_.go_to(frame->seconds);
     open_others(scene);
     open_models(scene);
-    fire_ = medium_of_fire(viewer_, scene);
-    if (fire_) check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
+    fire_ = cumulet::demo::medium_of_fire(viewer_, scene);
+    if (fire_) {
+      check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
+      fire_look_.take(viewer_, scene);
+    }
     wait(viewer_, progress_);
     if (others_.plays()) cumulet_cancel(viewer_.get());  // stops reading ahead in sequences
   }
@@ -356,7 +348,8 @@ class Studio {
       if (const auto hint = cumulet::demo::up_hint(other)) print_line(progress_, *hint);
     if (scene.is_shown() && scene.auto_density_scale)
       cumulet::demo::print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
-    if (fire_) print_fire(*fire_, progress_);
+    if (fire_) cumulet::demo::print_fire(*fire_, progress_);
+    fire_look_.print_light(progress_);
   }
 
   /// Applies the settings that need the loaded surfaces: material variant and camera.
@@ -405,7 +398,8 @@ class Studio {
       check(viewer_, cumulet_measure_noise(viewer_.get(), &noise));
       cumulet::demo::write_stats(options, viewer_, context_.name());
     }
-    cumulet::demo::write_picture(viewer_, options, others_, denoised, progress_);
+    write_exposed(options, denoised);
+    fire_look_.print_exposure(options.output, progress_);
   }
 
   /// Writes a checkpoint, so that another run can continue after the time limit.
@@ -441,11 +435,16 @@ class Studio {
     return std::chrono::duration<double>(Clock::now() - start).count();
   }
 
+  void write_exposed(const RenderOptions& options, const std::vector<float>& denoised) {
+    fire_look_.expose(viewer_, options, denoised);
+    cumulet::demo::write_picture(viewer_, fire_look_.shown(options), others_, denoised, progress_);
+  }
+
   /// Writes the image so far. A failure is logged, because the disk may have space at the end.
   void write_early(const RenderOptions& options) {
     try {
       const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, network_, progress_);
-      cumulet::demo::write_picture(viewer_, options, others_, denoised, progress_);
+      write_exposed(options, denoised);
     } catch (const std::exception& error) {
       print_line(progress_, std::string("warning: the image so far was not written: ") + error.what());
     }
@@ -583,6 +582,7 @@ class Studio {
   }
 
   Progress progress_;
+  FireLook fire_look_;
   Clock::time_point start_ = Clock::now();
   double traced_seconds_ = 0.0;
   cumulet::demo::Messages messages_{progress_};
@@ -658,7 +658,7 @@ bool is_settled(const SceneOptions& scene) {
 /// camera.
 void settle(const Viewer& viewer, RenderOptions& options) {
   SceneOptions& scene = options.scene;
-  const std::optional<cumulet_medium_desc> fire = medium_of_fire(viewer, scene);
+  const std::optional<cumulet_medium_desc> fire = cumulet::demo::medium_of_fire(viewer, scene);
   if (std::exchange(scene.auto_density_scale, false)) {
     double& scale = scene.medium.density_scale;
     if (fire) {
@@ -689,7 +689,7 @@ void settle(const Viewer& viewer, RenderOptions& options) {
 std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& plan) {
   const SceneOptions given = options.scene;
   const bool kept = !options.sequence_cache.empty() && !is_settled(given);
-  const bool known = kept && cumulet::demo::read_settled(options.sequence_cache, options.scene, plan.analyzed_by);
+  const bool known = kept && cumulet::demo::read_settled(options, plan.analyzed_by);
   if (kept && !known) cumulet::image::check_writable(options.sequence_cache);
   auto studio = std::make_unique<Studio>(options);
   wait(studio->viewer(), studio->progress());
@@ -709,7 +709,8 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
     }
     studio->remark(probe);
     settle(studio->viewer(), options);
-    if (kept) cumulet::demo::write_settled(options.sequence_cache, given, options.scene, state);
+    studio->fire_look().settle(options.scene);
+    if (kept) cumulet::demo::write_settled(options, given, state);
     break;
   }
   return studio;

@@ -612,6 +612,10 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
              "How to create the OpenGL context without a display (default: auto, which tries EGL, then OSMesa)");
 }
 
+// Flags that set light, exposure or tone map.
+constexpr std::array look_flags = {"--sun",      "--sun-angle", "--sky",   "--sky-model", "--env",
+                                   "--exposure", "--tone-map",  "--light", "--lut",       "--ocio"};
+
 /// Returns the denoising of an image for which --denoise is not given. has_scene: a scene file sets it.
 Denoise default_denoise(const RenderOptions& options, bool has_scene) {
   const SceneOptions& scene = options.scene;
@@ -726,6 +730,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (!options.ocio.config.empty() && !options.lut.empty()) throw UsageError("--ocio and --lut exclude each other");
   if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   options.denoises_by_default = app.count("--denoise") == 0;
+  options.default_look = std::ranges::all_of(look_flags, [&](const char* flag) { return app.count(flag) == 0; });
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);
   check_together(options, part);
   // Like every scene setting, it changes the scene hash in the file.

@@ -71,6 +71,7 @@ struct RenderOptions {
   std::optional<std::uint32_t> thumbnail;  // pixels per side
   std::string lut;                         // a .cube file; empty: none
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
+  bool default_look = true;  // no flag sets light, exposure or tone map
   OcioView ocio;
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }

@@ -13,12 +13,13 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr std::string_view first_line = "Cumulet settled 2\n";
+constexpr std::string_view first_line = "Cumulet settled 3\n";
 
-/// Returns the first lines of the file: format, version, scene and image size. The volume's state and the scene follow.
-std::string head(const SceneOptions& given) {
+/// Returns the first lines of the file: format, version, scene, image size and whether the look is the default one. The
+/// volume's state and the scene follow.
+std::string head(const SceneOptions& given, bool default_look) {
   return std::string(first_line) + version_text() + ' ' + scene_hash(given) + ' ' + std::to_string(given.width) + 'x' +
-         std::to_string(given.height) + '\n';
+         std::to_string(given.height) + (default_look ? " default look\n" : "\n");
 }
 
 /// Returns the name without folders, also of a folder with a slash at its end.
@@ -55,11 +56,13 @@ std::string volume_state(const std::string& volume) {
          std::to_string(std::chrono::duration_cast<std::chrono::seconds>(changed).count()) + ' ' + name_of(volume);
 }
 
-bool read_settled(const std::string& file, SceneOptions& scene, std::span<const std::string> volumes) {
+bool read_settled(RenderOptions& options, std::span<const std::string> volumes) {
+  const std::string& file = options.sequence_cache;
+  SceneOptions& scene = options.scene;
   std::error_code none;
   if (!std::filesystem::exists(file, none)) return false;
   const std::string text = image::read_file(file);
-  const std::string wanted = head(scene);
+  const std::string wanted = head(scene, options.default_look);
   if (!text.starts_with(wanted)) return false;
   const std::string_view rest = std::string_view(text).substr(wanted.size());
   const std::string_view state = rest.substr(0, rest.find('\n'));
@@ -77,14 +80,17 @@ bool read_settled(const std::string& file, SceneOptions& scene, std::span<const 
   }
   scene.auto_density_scale = found->auto_density_scale;
   scene.medium = found->medium;
+  scene.light = found->light;
+  scene.display.exposure_stops = found->display.exposure_stops;
+  scene.display.tone_map = found->display.tone_map;
   scene.ground = found->ground;
   scene.camera = found->camera;
   return true;
 }
 
-void write_settled(const std::string& file, const SceneOptions& given, const SceneOptions& found,
-                   const std::string& state) {
-  image::replace_file(file, head(given) + state + '\n' + scene_text(found, file));
+void write_settled(const RenderOptions& options, const SceneOptions& given, const std::string& state) {
+  const std::string& file = options.sequence_cache;
+  image::replace_file(file, head(given, options.default_look) + state + '\n' + scene_text(options.scene, file));
 }
 
 }  // namespace cumulet::demo

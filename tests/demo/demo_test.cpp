@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <default_look.hpp>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -295,6 +296,12 @@ TEST(DemoModel, DuskReplacesOnlyTheDefaultLook) {
     EXPECT_FALSE(give_day(chosen));
     EXPECT_TRUE(same_scene(chosen, before));
   }
+  // Zeros are the library's defaults.
+  SceneOptions unsaid;
+  unsaid.set_daylight();
+  EXPECT_TRUE(take_dusk(unsaid));
+  EXPECT_EQ(unsaid.light.sun_elevation_degrees, 3.0f);
+  EXPECT_EQ(unsaid.display.tone_map, CUMULET_TONE_MAP_FILMIC);
   // The environment is the light.
   SceneOptions surrounded = day;
   surrounded.environment = "sky.hdr";

@@ -1,10 +1,11 @@
 """The first image of cumulet-render with default settings. A cloud is neither black nor overexposed, at any density. An
-explosion shows flames in dark smoke.
+explosion shows flames in dark smoke at dusk, also as the frames of a sequence.
 
 Usage: first_picture.py RENDER CLOUD EXPLOSION OUT_FOLDER
 """
 
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -17,6 +18,27 @@ def luminances(picture):
     n = picture.channels
     return [(0.2126 * row[x] + 0.7152 * row[x + 1] + 0.0722 * row[x + 2]) / 255
             for row in picture.rows for x in range(0, n * picture.width, n)]
+
+
+def sequence(render, explosion, out):
+    """All frames have the same exposure and light."""
+    folder = out / "frames"
+    folder.mkdir(exist_ok=True)
+    for number in (1, 2):
+        shutil.copy(explosion, folder / f"fire_{number}.vdb")
+    done = subprocess.run([render, f"{folder}/fire_#.vdb", "--size", "32x20", "--spp", "4", "--overwrite", "-o", f"{out}/frame_#.png"],
+                          check=True, timeout=180, stderr=subprocess.PIPE, text=True)
+    assert done.stderr.count("dusk light") == 1 and "suits the image" not in done.stderr, done.stderr
+    first, second = (Picture(out / f"frame_{number}.png").rows for number in (1, 2))
+    assert first == second, "the same light"
+    # Without the volume from which the first run took the look
+    cache = out / "cache"
+    cache.unlink(missing_ok=True)
+    for given in ([], [], ["--tone-map", "neutral"]):
+        done = subprocess.run([render, f"{folder}/fire_#.vdb", "--size", "32x20", "--spp", "4", "--overwrite", "--frames", "2", "--sequence-cache",
+                               str(cache), *given, "-o", f"{out}/again_#.png"], check=True, timeout=180, stderr=subprocess.PIPE, text=True)
+        rows = Picture(out / "again_2.png").rows
+        assert (rows == second) == (not given), (given, done.stderr)
 
 
 def main():
@@ -42,14 +64,30 @@ def main():
         assert 0.35 < sum(middle) / len(middle) < 0.95, (name, sum(middle) / len(middle))
         assert max(values) - min(values) > 0.3, (name, min(values), max(values))
 
-    subprocess.run([render, explosion, "--size", "64x40", "--spp", "32", "-o", f"{out}/fire.png"], check=True, timeout=90)
-    picture = Picture(out / "fire.png")
-    n = picture.channels
-    pixels = [row[x:x + 3] for row in picture.rows for x in range(0, n * picture.width, n)]
+    def fire(name, *more, volume=explosion, ending="png"):
+        """Returns the picture's pixels and the messages."""
+        file = f"{out}/{name}.{ending}"
+        done = subprocess.run([render, volume, "--size", "64x40", "--spp", "32", "-o", file, *more], check=True, timeout=180,
+                              stderr=subprocess.PIPE, text=True)
+        if ending != "png" or "####" in file:
+            return [], done.stderr
+        picture = Picture(file)
+        n = picture.channels
+        return [row[x:x + 3] for row in picture.rows for x in range(0, n * picture.width, n)], done.stderr
+
+    pixels, messages = fire("fire")
     burnt, orange, dark = (sum(map(test, pixels)) / len(pixels) for test in (
         lambda p: min(p) > 250, lambda p: p[0] > 150 and p[0] > 1.4 * p[2] and p[0] > 1.15 * p[1], lambda p: max(p) < 70))
     print(f"fire: burnt {100 * burnt:.2f} %, orange {100 * orange:.2f} %, dark {100 * dark:.2f} %")
     assert burnt < 0.002 and orange > 0.03 and dark > 0.01, (burnt, orange, dark)
+    assert messages.count("using dusk light, --tone-map filmic and --exposure 1 ") == 1, messages
+    # Any option of the look keeps the daylight.
+    blue = lambda pixels: sum(p[2] - p[0] for p in pixels[:8 * 64]) / (8 * 64)  # of the sky
+    for number, given in enumerate((["--tone-map", "neutral"], ["--exposure", "0"])):
+        day, messages = fire(f"day{number}", *given)
+        assert "dusk" not in messages and blue(day) > blue(pixels) + 20, (given, blue(day), blue(pixels), messages)
+    assert "dusk" in fire("linear", ending="exr")[1], "linear radiance has the light too"
+    sequence(render, explosion, out)
 
 
 main()

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "measurements.hpp"
 #include "picture_job.hpp"
 #include "render_queue.hpp"
 #include "support/folder.hpp"
@@ -91,20 +92,56 @@ TEST(RenderQueueTest, CancelsRunningAndWaitingJobs) {
 
 TEST(TimeLeftTest, FollowsFromTheRate) {
   TimeLeft left;
-  EXPECT_FALSE(left.seconds());
+  const auto seconds = [&left] { return left.seconds(0.0); };
+  EXPECT_FALSE(seconds());
   left.see(0.1, 10.0);
   left.see(0.101, 10.1);
-  EXPECT_FALSE(left.seconds()) << "too early";
+  EXPECT_FALSE(seconds()) << "too early";
   left.see(0.3, 12.0);
-  EXPECT_NEAR(left.seconds().value(), 7.0, 1e-9);
+  EXPECT_NEAR(seconds().value(), 7.0, 1e-9);
   left.see(0.1, 13.0);
-  EXPECT_FALSE(left.seconds()) << "another image";
+  EXPECT_FALSE(seconds()) << "another image";
   left.see(0.6, 14.0);
-  EXPECT_NEAR(left.seconds().value(), 0.8, 1e-9);
+  EXPECT_NEAR(seconds().value(), 0.8, 1e-9);
   left.see(1.0, 15.0);
-  EXPECT_FALSE(left.seconds());
+  EXPECT_FALSE(seconds());
   left.rest();
-  EXPECT_FALSE(left.seconds());
+  EXPECT_FALSE(seconds());
+}
+
+// A loaded machine completes a tiny part of the first sample in the first second.
+TEST(TimeLeftTest, NeedsAWholeSample) {
+  cumulet_sampling_desc sampling{};
+  sampling.samples = 256;
+  const double sample = part_of_a_sample(sampling);
+  TimeLeft left;
+  left.see(1e-6, 10.0);
+  left.see(7e-6, 11.0);
+  EXPECT_FALSE(left.seconds(sample)) << "46 hours";
+  left.see(0.9 * sample, 14.0);
+  EXPECT_FALSE(left.seconds(sample));
+  left.see(1e-6 + sample, 15.0);
+  EXPECT_NEAR(left.seconds(sample).value(), 5.0 * 255.0, 1.0);
+}
+
+TEST(MeasurementsTest, TimeLeftNeedsAWholeImage) {
+  Charts charts;
+  Measurements measurements(charts);
+  cumulet_sampling_desc sampling{};
+  sampling.samples = 10;
+  Status status;
+  status.frame.flags = CUMULET_RENDER_INCOMPLETE;
+  const auto see = [&](double progress, double now) {
+    status.frame.progress = progress;
+    measurements.take_status(status, 0, now);
+    return measurements.seconds_left(sampling);
+  };
+  EXPECT_FALSE(see(0.01, 1.0));
+  EXPECT_FALSE(see(0.099, 20.0)) << "no pixel-complete image";
+  status.frame.width = status.frame.height = 8;
+  EXPECT_FALSE(see(0.1, 21.0));
+  EXPECT_FALSE(see(0.15, 22.0));
+  EXPECT_NEAR(see(0.2, 23.0).value(), 16.0, 1e-9) << "the slow first sample does not count";
 }
 
 TEST(PictureJobTest, FileNameFollowsTheFormat) {

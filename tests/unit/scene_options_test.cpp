@@ -62,6 +62,24 @@ TEST_F(SceneOption, FlagsOverrideTheSceneFileInAnyOrder) {
   EXPECT_EQ(mixed->scene.display.exposure_stops, 2.0f);
 }
 
+TEST_F(SceneOption, OnlyOptionsOfTheLookSetTheLook) {
+  const auto by_default = [](const Arguments& more) {
+    std::ostringstream out;
+    return parse_render_options(with(more), out)->default_look;
+  };
+  EXPECT_TRUE(by_default({}));
+  EXPECT_TRUE(by_default({"--spp", "4", "--preset", "fire", "--background", "transparent"}));
+  for (const Arguments& given : {Arguments{"--sun", "65,40 1,1,1"},
+                                 {"--sky", "0,0,0"},
+                                 {"--sky-model", "2.5,0.3"},
+                                 {"--env", "a.hdr"},
+                                 {"--exposure", "0"},
+                                 {"--tone-map", "neutral"},
+                                 {"--light", "point power=1"},
+                                 {"--ocio", "a.ocio"}})
+    EXPECT_FALSE(by_default(given)) << given.front();
+}
+
 TEST_F(SceneOption, SelectsACameraOfTheScene) {
   const std::string path = write_scene(R"({"cumulet_scene": 2, "volumes": [{"file": "/a/smoke.vdb"}],
     "models": [{"file": "/a/m.glb", "camera": 3}], "camera": "front", "cameras": [

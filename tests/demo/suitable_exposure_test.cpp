@@ -1,19 +1,21 @@
-// The exposure that cumulet-demo derives from an image.
+// The exposure that the programs derive from an image.
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <default_look.hpp>
 #include <limits>
+#include <suitable_exposure.hpp>
 #include <vector>
 
-#include "auto_exposure.hpp"
 #include "model.hpp"
 
 namespace {
 
 using namespace cumulet::demo;
+using cumulet::image::suitable_exposure;
 
 constexpr std::uint32_t width = 96;
 constexpr std::uint32_t height = 72;

@@ -1,12 +1,11 @@
-#include "auto_exposure.hpp"
+#include "suitable_exposure.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 #include <vector>
 
-namespace cumulet::demo {
+namespace cumulet::image {
 namespace {
 
 constexpr std::uint32_t blocks_across = 24;  // few, so that the noise of the first samples is averaged
@@ -58,29 +57,4 @@ std::optional<float> suitable_exposure(std::span<const float> rgba, std::uint32_
   return static_cast<float>(std::round(10.0 * std::clamp(stops, -max_stops, max_stops)) / 10.0);
 }
 
-std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool complete) {
-  if (turns_ && complete) {
-    // Each of these frames begins a read, so that reads() asks for the next one. The last read counts.
-    if (--*turns_ <= 0) turns_.reset();
-    if (read_ != 0) static_cast<void>(cumulet_cancel_read(viewer, std::exchange(read_, 0)));
-    cumulet_read_desc desc{};
-    desc.struct_size = sizeof desc;
-    desc.source = CUMULET_READ_LINEAR;
-    if (cumulet_begin_read(viewer, &desc, &read_) != CUMULET_OK) read_ = 0;
-    return std::nullopt;
-  }
-  if (turns_ || read_ == 0) return std::nullopt;
-  cumulet_read_info info{};
-  info.struct_size = sizeof info;
-  if (cumulet_finish_read(viewer, read_, nullptr, 0, &info) != CUMULET_OK) {
-    read_ = 0;
-    return std::nullopt;
-  }
-  if (info.ready == 0) return std::nullopt;
-  std::vector<float> rgba(std::size_t{info.channels} * info.width * info.height);
-  const std::uint64_t read = std::exchange(read_, 0);
-  if (cumulet_finish_read(viewer, read, rgba.data(), rgba.size(), &info) != CUMULET_OK) return std::nullopt;
-  return Metered{suitable_exposure(rgba, info.width, info.height)};
-}
-
-}  // namespace cumulet::demo
+}  // namespace cumulet::image
