@@ -255,6 +255,7 @@ struct App::Commands {
        [](App& app, const Command& command) {
          if (!app.ask_about_changes({command})) app.quit_ = true;
        }},
+      {Action::follow_light, [](App& app, const Command&) { app.meter_after_load(); }},
       {Action::daylight,
        [](App& app, const Command&) {
          if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_after_load();

@@ -7,8 +7,9 @@
 
 namespace cumulet::demo {
 
-std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool complete) {
-  if (turns_ && complete) {
+std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool complete, std::uint32_t flags) {
+  if ((flags & (CUMULET_RENDER_NEW_IMAGE | CUMULET_RENDER_CONVERGED)) != 0) fresh_ = true;
+  if (turns_ && complete && fresh_) {
     // Each of these frames begins a read, so that reads() asks for the next one. The last read counts.
     if (--*turns_ <= 0) turns_.reset();
     if (read_ != 0) static_cast<void>(cumulet_cancel_read(viewer, std::exchange(read_, 0)));

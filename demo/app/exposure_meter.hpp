@@ -17,18 +17,22 @@ struct Metered {
 class ExposureMeter {
  public:
   /// Requests a measurement. It replaces a previous one.
-  void request() { turns_ = settle; }
+  void request() {
+    turns_ = settle;
+    fresh_ = false;
+  }
   /// Returns true while the viewer's values are being copied, which more frames or calls of follow() must await.
   [[nodiscard]] bool reads() const { return read_ != 0; }
-  /// Call once per frame. complete: the image shows the whole scene, with at least one sample per pixel. Returns the
-  /// requested measurement once.
-  [[nodiscard]] std::optional<Metered> follow(cumulet_viewer* viewer, bool complete);
+  /// Call once per frame. complete: the image shows the whole scene. flags: CUMULET_RENDER_* bits of the frame. Returns
+  /// the requested measurement once, of an image that has the settings of the request.
+  [[nodiscard]] std::optional<Metered> follow(cumulet_viewer* viewer, bool complete, std::uint32_t flags);
 
  private:
-  // Complete frames between a request and the measured one, because frames first show the image before a change.
+  // Complete frames with the new settings until the measured one.
   static constexpr int settle = 4;
 
   std::optional<int> turns_;  // complete frames until the read begins; nullopt: nothing was requested
+  bool fresh_ = false;        // there has been an image since the request; before, frames show an older one
   std::uint64_t read_ = 0;    // number of the read; 0: none
 };
 

@@ -30,7 +30,7 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
     case Part::camera:
       return camera(model, commands);
     case Part::sun_sky:
-      return light(model);
+      return light(model, commands);
     case Part::environment:
       return environment(model, commands);
     case Part::ground:

@@ -95,6 +95,7 @@ enum class Action {
   clear_region,  // removes the render region
   quit,          // asks about unsaved changes and unfinished pictures
   quit_anyway,   // asks only about unsaved changes
+  follow_light,  // measures the exposure again, because the sun has moved
   daylight       // sets the default daylight and display instead of the dusk of a burning volume
 };
 

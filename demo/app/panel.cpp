@@ -146,15 +146,22 @@ void Panel::display(Model& model, std::vector<Command>& commands) {
   });
 }
 
-void Panel::light(Model& model) {
+void Panel::light(Model& model, std::vector<Command>& commands) {
   cumulet_sun_sky_desc& light = model.scene.light;
   const auto& camera = model.scene.camera;
   const double azimuth =
       std::atan2(camera.eye[0] - camera.target[0], camera.eye[2] - camera.target[2]) * 180.0 / std::numbers::pi;
-  ui_.sun_dial("Sun dial",
-               "Drag to set the sun's direction. The angle is the azimuth, the rim the horizon, the center the zenith. "
-               "Keyboard: Space, then the arrow keys, then Space. The triangle marks the camera.",
-               light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
+  const bool dialed = ui_.sun_dial(
+      "Sun dial",
+      "Drag to set the sun's direction. The angle is the azimuth, the rim the horizon, the center the zenith. "
+      "Keyboard: Space, then the arrow keys, then Space. The triangle marks the camera.",
+      light.sun_azimuth_degrees, light.sun_elevation_degrees, static_cast<float>(azimuth));
+  const bool moved = time_of_day(light);
+  sun_moves_ |= dialed || moved;
+  if (sun_moves_ && !ImGui::IsAnyItemActive()) {
+    sun_moves_ = false;
+    commands.push_back({Action::follow_light});
+  }
   using Desc = cumulet_sun_sky_desc;
   const bool physical = light.sky == CUMULET_SKY_PHYSICAL;
   settings::for_each<Desc>([&](const auto& setting) {
@@ -167,6 +174,30 @@ void Panel::light(Model& model) {
       rows_.draw(setting, light.*setting.field);
     }
   });
+}
+
+bool Panel::time_of_day(cumulet_sun_sky_desc& light) {
+  const SunAngles sun{static_cast<double>(light.sun_azimuth_degrees), static_cast<double>(light.sun_elevation_degrees)};
+  // Every sun of the path keeps it, so that a drag from noon to the evening and back ends where it began.
+  const auto is_on = [&](const SunPath& path) {
+    constexpr double tolerance = 0.01;  // degrees
+    const SunAngles nearest = path.at(path.hour_of(sun));
+    return std::abs(nearest.elevation - sun.elevation) < tolerance &&
+           std::abs(wrap_degrees(nearest.azimuth - sun.azimuth)) < tolerance;
+  };
+  if (!sun_path_ || !is_on(*sun_path_))
+    sun_path_ = SunPath::through(sun, !sun_path_ || sun_path_->hour_of(sun) >= 12.0);
+  double hour = sun_path_->hour_of(sun);
+  if (!ui_.slider(
+          "Time of day",
+          "Moves the sun along its path over a day at the equinox: it rises at 6 and sets at 18 hours. The dial "
+          "turns the path.",
+          hour, SunPath::first_hour, SunPath::last_hour, "%.2f h"))
+    return false;
+  const SunAngles moved = sun_path_->at(hour);
+  light.sun_azimuth_degrees = static_cast<float>(moved.azimuth);
+  light.sun_elevation_degrees = static_cast<float>(moved.elevation);
+  return true;
 }
 
 void Panel::ground(Model& model) {

@@ -13,6 +13,7 @@
 #include "ramp_edit.hpp"
 #include "render_dialog.hpp"
 #include "rows.hpp"
+#include "sun_path.hpp"
 #include "ui.hpp"
 
 namespace cumulet::demo {
@@ -55,7 +56,7 @@ class Panel {
   /// Draws the saved cameras of the scene.
   void cameras(Model& model);
   void display(Model& model, std::vector<Command>& commands);
-  void light(Model& model);
+  void light(Model& model, std::vector<Command>& commands);
   void environment(Model& model, std::vector<Command>& commands);
   /// Draws the transform of a volume.
   void stand(SceneVolume& volume, std::size_t transform_index);
@@ -80,6 +81,8 @@ class Panel {
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::SettingInfo info, cumulet_grid_desc& grid);
   void ground(Model& model);
+  /// Draws a slider that moves the sun along its path over a day. Returns true if it did.
+  bool time_of_day(cumulet_sun_sky_desc& light);
   void sun_angle(const settings::SettingInfo& info, cumulet_sun_sky_desc& light);
 
   void loading(const Model& model, std::vector<Command>& commands);
@@ -103,7 +106,9 @@ class Panel {
   bool help_was_closed_ = true;
   double time_ = 0.0;
   Rectangle view_;
-  std::optional<Item> seen_;  // selected object in the last frame
+  std::optional<Item> seen_;         // selected object in the last frame
+  bool sun_moves_ = false;           // until the mouse is released
+  std::optional<SunPath> sun_path_;  // nullopt: the light has not been shown yet
   std::string state_;
   std::string name_;         // while it is typed
   std::string camera_name_;  // while it is typed

@@ -530,7 +530,7 @@ void Session::measure_exposure() {
       (frame.flags & CUMULET_RENDER_PREVIEW) != 0 && (!surfaces_.shown.empty() || !scene_.models.empty());
   const bool complete = !waits() && !status_.busy && !preview && frame.width > 0 && frame.progress > 0.0 &&
                         scene_.sampling.view == CUMULET_VIEW_SHADED;
-  if (auto metered = meter_.follow(viewer_.get(), complete)) events_.metered = *metered;
+  if (auto metered = meter_.follow(viewer_.get(), complete, frame.flags)) events_.metered = *metered;
 }
 
 // Measures the noise once per second while the image refines.

@@ -80,6 +80,30 @@ def test_render(s):
         assert not (s.out / name).exists(), name
 
 
+def test_walk(s):
+    """Loads a cloud, sets the sunset, adds a light and saves 1920x1080, by what the window shows alone: buttons, and the
+    keys that its menus name."""
+    typed = ["frames 2", "key ctrl+a", "frames 1"]
+    hand = ['click "Start/Open"', "frames 3", *typed, f'text "{s.cumulus}"', "key enter", "frames 3", "wait loaded", "frames 3", *shot("loaded"),
+            'click "Scene/Sun & sky"', "frames 2", 'drag "Time of day" 0.7 0.5 to "Time of day" 0.905 0.5', "frames 3", "wait converged", "frames 30", *shot("sunset"),
+            'click "Add light"', "frames 3", *shot("lit"),
+            "key f12", "frames 3", *shot("dialog"), *choose("Resolution", "Full HD 1920x1080"),
+            *enter("Max samples", "2"), *enter("Picture file", "walk.png"), "wait rendered", "frames 3", *shot("saved")]
+    s.play("replay", hand, "--spp", "2", "--denoise", "fast", "--shader-cache", "shaders", size=["--size", "1440x900"], auto_exposure=True)
+    picture = s.picture("walk")
+    assert [picture.width, picture.height] == [1920, 1080]
+    assert s.report("loaded")["volumes"][0]["file"].endswith("cumulus.vdb")
+    assert 0.0 < s.report("sunset")["scene"]["light"]["sun"]["elevation_degrees"] < 12.0, s.report("sunset")["scene"]["light"]
+    assert s.report("sunset")["scene"]["display"]["exposure_stops"] > 0.4, "the exposure follows the sun"
+    (light,) = s.report("lit")["lights"]
+    assert light["power"] > 0.0
+    (entry,) = s.report("saved")["renders"]
+    assert entry["state"] == DONE, entry
+    assert [m for m in s.report("saved")["messages"] if m["error"]] == []
+    actions = [command for command in hand if command.split()[0] in ("click", "drag", "key", "text")]
+    assert len(actions) < 30, "three minutes at six seconds each"
+
+
 def test_render_sequence(s):
     """A range of frames becomes numbered files. The clock of the window does not matter."""
     for number in range(1, 5):
