@@ -133,7 +133,8 @@ bool reorder(Model& model, const Item& from, const Item& to) {
 
 namespace {
 
-constexpr double sun_at_noon = 4.0;  // W/m²
+// Half of the noon sun's in W/m², because parts of the scene are nearer to the light.
+constexpr double new_light_irradiance = 2.0;
 
 }  // namespace
 
@@ -147,7 +148,8 @@ void add_light(Model& model) {
   std::copy(camera.target, camera.target + 3, light.position);
   light.position[1] += above;
   light.direction[1] = -1.0;
-  light.power = static_cast<float>(sun_at_noon * 4.0 * std::numbers::pi * above * above);
+  const double irradiance = new_light_irradiance * std::exp2(-static_cast<double>(model.scene.display.exposure_stops));
+  light.power = static_cast<float>(irradiance * 4.0 * std::numbers::pi * above * above);
   settings::spell_out_zeros(light);
   select(model, Item{Item::Kind::analytic_light, model.scene.analytic_lights.size() - 1, 0});
 }

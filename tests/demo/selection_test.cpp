@@ -135,4 +135,16 @@ TEST(Selection, ChangesOfTheOrderAreNamed) {
   }
 }
 
+TEST(Selection, ANewLightSuitsTheExposure) {
+  const auto power = [](float stops) {
+    Model model;
+    model.scene.camera.eye[2] = 10.0;
+    model.scene.display.exposure_stops = stops;
+    add_light(model);
+    return model.scene.analytic_lights.at(0).power;
+  };
+  EXPECT_NEAR(power(0.0f), 2.0 * 4.0 * 3.14159265 * 25.0, 0.01);
+  EXPECT_FLOAT_EQ(power(3.0f), power(0.0f) / 8.0f);
+}
+
 }  // namespace
