@@ -54,6 +54,7 @@ class Panel {
   /// Draws the saved cameras of the scene.
   void cameras(Model& model);
   void display(Model& model, std::vector<Command>& commands);
+  void ocio(Model& model, std::vector<Command>& commands);
   void light(Model& model);
   void environment(Model& model, std::vector<Command>& commands);
   /// Draws the transform of a volume.

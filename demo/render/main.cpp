@@ -528,10 +528,12 @@ class Studio {
   }
 
   void set_display_lut(const RenderOptions& options) {
-    if (options.lut.empty() && options.ocio.config.empty()) return;
+    const cumulet::demo::OcioView& ocio = options.scene.ocio;
+    // The other formats store linear radiance.
+    if (options.format != OutputFormat::png || (options.lut.empty() && ocio.config.empty())) return;
     std::string note;
-    cumulet::demo::DisplayLut lut = options.lut.empty() ? cumulet::demo::bake_ocio_view(options.ocio, &note)
-                                                        : cumulet::demo::read_cube_lut(options.lut);
+    cumulet::demo::DisplayLut lut =
+        options.lut.empty() ? cumulet::demo::bake_ocio_view(ocio, &note) : cumulet::demo::read_cube_lut(options.lut);
     if (!options.lut.empty()) lut.shaper = options.lut_shaper;
     if (!note.empty()) cumulet::demo::Messages::print(&messages_, CUMULET_LOG_INFO, note.c_str());
     const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut);

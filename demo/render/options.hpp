@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "ocio_lut.hpp"
 #include "option_values.hpp"
 
 namespace CLI {
@@ -25,8 +24,9 @@ namespace cumulet::demo {
 void add_scene_options(CLI::App& app, SceneOptions& scene);
 /// Adds --ocio and the flags that choose its view.
 void add_ocio_options(CLI::App& app, const char* group, OcioView& view);
-/// Throws UsageError for flags without --ocio.
-void check_ocio_options(const OcioView& view);
+/// Completes the view after the parse: another tone map or LUT replaces that of a scene file. Throws UsageError for
+/// flags that exclude each other or lack --ocio.
+void finish_ocio_options(const CLI::App& app, OcioView& view);
 /// Kinds of files that were named without a flag.
 struct NamedFiles {
   bool scene = false;  ///< a scene file, which sets the light
@@ -72,7 +72,6 @@ struct RenderOptions {
   std::string lut;                         // a .cube file; empty: none
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
   bool default_look = true;  // no flag sets light, exposure or tone map
-  OcioView ocio;
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };
