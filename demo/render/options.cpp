@@ -594,6 +594,10 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
   add_path(app, group, "--oidn-weights", "DIR", options.denoiser,
            "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
            "$XDG_DATA_HOME)");
+  add_path(
+      app, group, "--oidn-library", "FILE|off", options.oidn_library,
+      "Library of Open Image Denoise, which does --denoise high where OpenGL runs on the CPU and needs no networks "
+      "(default: $CUMULET_OIDN_LIBRARY, else libOpenImageDenoise.so.2 if it is installed)");
   add_path(app, group, "--lut", "FILE", options.lut,
            "3D LUT (.cube, at most 65^3 points) that replaces the tone map of .png files (default: none)");
   add_choice(app, group, "--lut-input",

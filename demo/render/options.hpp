@@ -66,6 +66,7 @@ struct RenderOptions {
   Denoise denoise = Denoise::off;          // for .exr, the denoised image is an additional layer
   bool denoises_by_default = false;        // --denoise is not given
   std::string denoiser;                    // folder of networks; empty: denoiser_folder()
+  std::string oidn_library;                // file or "off"; empty: find_denoiser()
   std::vector<cumulet_aov> aovs;           // additional layers of an .exr
   bool cryptomatte = false;                // additional layers of an .exr
   std::optional<std::uint32_t> thumbnail;  // pixels per side
