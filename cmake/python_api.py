@@ -19,7 +19,7 @@ SCALARS = {"char": "c_char", "double": "c_double", "float": "c_float", "int32_t"
 # Enums without a name that are sets of bits, by the prefix of their constants.
 BITS = {"CUMULET_RENDER_": "RenderFlags", "CUMULET_MODIFIER_": "Modifiers"}
 NUMBERS = {"key"} | descriptors.COUNTED  # int32_t members that are numbers, not booleans
-PATHS = {"path", "folder", "shaders", "network"}
+PATHS = {"path", "folder", "shaders", "network", "oidn_library"}
 # Members that are arrays: the member with their length, and elements per count.
 COUNTS = {"values": ("value_count", 1), "brick_origins": ("brick_count", 3), "brick_values": ("brick_count", 512),
           "brick_active": ("brick_count", 8), "tiles": ("tile_count", 1), "fields": ("field_count", 1),

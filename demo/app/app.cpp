@@ -371,8 +371,7 @@ void App::take_look(const cumulet_medium_desc& look) {
   derived_.look = look;
   model_.scene.medium = look;
   if (!burns()) give_day(model_.scene, derived_.exposure);
-  // A view of OpenColorIO replaces the tone map.
-  if (burns() && !burned && options_.viewer.ocio.config.empty() && take_dusk(model_.scene, derived_.exposure))
+  if (burns() && !burned && take_dusk(model_.scene, derived_.exposure))
     show_message(
         model_, false, "The volume burns: dusk light and the filmic tone map", now_,
         MessageButton{"Daylight", "Sets the default daylight and tone map. Ctrl+Z undoes that.", {Action::daylight}});

@@ -104,6 +104,7 @@ std::string change_name(const SceneOptions& before, const SceneOptions& after) {
       setting_name(before.environment_settings, after.environment_settings, "Environment"),
       setting_name(before.ground, after.ground, "Ground"),
       setting_name(before.surface, after.surface, "Model"),
+      before.ocio != after.ocio ? "OpenColorIO view" : "",
       setting_name(before.display, after.display, "Image"),
       setting_name(before.sampling, after.sampling, "Sampling"),
       setting_name(before.grid, after.grid, "Grid"),

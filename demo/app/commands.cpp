@@ -14,6 +14,7 @@
 #include "app.hpp"
 #include "desktop.hpp"
 #include "dropped_files.hpp"
+#include "ocio_text.hpp"
 #include "renderer.hpp"
 #include "selection.hpp"
 
@@ -78,6 +79,17 @@ struct App::Commands {
        [](App& app, const Command&) {
          app.model_.scene.environment.clear();
          give_daylight(app.model_.scene);
+       }},
+      {Action::ocio_dialog,
+       [](App& app, const Command&) { app.open_dialog("Open OpenColorIO configuration", Action::open_ocio, {".ocio"}); }},
+      {Action::open_ocio,
+       [](App& app, const Command& command) {
+         try {
+           static_cast<void>(ocio_displays(command.text));
+           app.model_.scene.ocio = {.config = command.text};
+         } catch (const std::exception& error) {
+           show_message(app.model_, true, ocio_text(error.what()), app.now_);
+         }
        }},
       {Action::save_scene,
        [](App& app, const Command&) {

@@ -57,10 +57,10 @@ std::optional<DemoOptions> parse_demo_options(std::vector<std::string> arguments
   add_folder("--shader-cache", options.viewer.shader_cache, "Cache compiled shaders in this folder");
   add_folder("--shaders", options.viewer.shaders,
              "Load shaders from this folder (a copy of glsl/) and reload them when they change");
-  add_ocio_options(app, group, options.viewer.ocio);
+  add_ocio_options(app, group, options.scene.ocio);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  check_ocio_options(options.viewer.ocio);
+  finish_ocio_options(app, options.scene.ocio);
   finish_scene_options(app, options.scene, {.model = is_model(options.open)});
   options.unchosen_ground = app.count("--ground") + app.count("--ground-height") + app.count("--scene") == 0;
   options.exposure_given = app.count("--exposure") + app.count("--scene") > 0;

@@ -8,6 +8,7 @@
 #include <frame_row.hpp>
 #include <map>
 #include <memory>
+#include <ocio_lut.hpp>
 #include <optional>
 #include <scene_file.hpp>
 #include <span>
@@ -38,6 +39,8 @@ enum class Action {
   add_model,  // text: the file
   environment_dialog,
   clear_environment,
+  ocio_dialog,
+  open_ocio,  // text: an OpenColorIO configuration
   save_scene,
   save_scene_dialog,
   save_scene_as,    // text: the file
@@ -222,6 +225,7 @@ struct Status {
   std::optional<double> noise;                             // relative standard error; nullopt if it is unknown
   std::array<FieldValues, settings::ramps.size()> fields;  // values of the grid of each ramp
   Boxes boxes;                                             // bounding boxes of the loaded files
+  std::shared_ptr<const OcioDisplays> ocio;                // of the OpenColorIO configuration in use; null: none
 };
 
 /// Statistics that are plotted over time.

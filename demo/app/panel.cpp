@@ -136,7 +136,8 @@ void Panel::display(Model& model, std::vector<Command>& commands) {
   Desc& display = model.scene.display;
   settings::for_each<Desc>([&](const auto& setting) {
     if (setting.is(&Desc::background_color) && display.background != CUMULET_BACKGROUND_COLOR) return;
-    rows_.draw(setting, display.*setting.field);
+    if (!setting.is(&Desc::tone_map) || model.scene.ocio.config.empty()) rows_.draw(setting, display.*setting.field);
+    if (setting.is(&Desc::tone_map)) ocio(model, commands);
     if (!setting.is(&Desc::exposure_stops)) return;
     ImGui::BeginDisabled(!model.status.has_content);
     if (ui_.button("Auto exposure", "Sets the exposure that suits the displayed image. Ctrl+Z undoes that.",

@@ -56,6 +56,7 @@ class Panel {
   /// Draws the saved cameras of the scene.
   void cameras(Model& model);
   void display(Model& model, std::vector<Command>& commands);
+  void ocio(Model& model, std::vector<Command>& commands);
   void light(Model& model, std::vector<Command>& commands);
   void environment(Model& model, std::vector<Command>& commands);
   /// Draws the transform of a volume.

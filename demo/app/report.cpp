@@ -108,6 +108,7 @@ void App::write_report(const std::string& path) const {
   json["fly"] = model_.navigation.fly != 0;
   json["scene"] = Json::parse(scene_text(model_.scene, path, SceneFormat::first));
   const Json current = Json::parse(scene_text(model_.scene, path));
+  json["ocio"] = current["display"].value("ocio", Json());
   // Version 1 has no such sections.
   for (const char* key : {"volumes", "models", "lights"}) json[key] = current.value(key, Json::array());
   image::replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -85,14 +85,9 @@ namespace {
 /// than none.
 std::vector<float> denoise(cumulet_viewer* viewer, const cumulet_frame_result& shown, Denoise how, std::string& note) {
   if (how == Denoise::off) return {};
-  std::string network;
+  const Denoiser denoiser = how == Denoise::high ? find_denoiser("", "", note) : Denoiser();
   try {
-    if (how == Denoise::high) network = find_network("");
-  } catch (const std::exception& error) {
-    note = std::string("denoised by the fast filter: ") + error.what();
-  }
-  try {
-    return denoised(viewer, network, std::size_t{4} * shown.width * shown.height);
+    return denoised(viewer, denoiser, std::size_t{4} * shown.width * shown.height);
   } catch (const std::exception& error) {
     note = std::string("not denoised: ") + error.what();
     return {};

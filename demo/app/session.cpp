@@ -16,6 +16,7 @@
 
 #include "fire.hpp"
 #include "history.hpp"
+#include "ocio_text.hpp"
 #include "saved_picture.hpp"
 
 namespace cumulet::demo {
@@ -72,14 +73,6 @@ Session::Session(cumulet_get_proc_fn get_proc, void* get_proc_user, std::functio
   std::array<char, 1024> error{};
   if (cumulet_create(&desc, &viewer, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
   viewer_.reset(viewer);
-  if (!setup.ocio.config.empty()) {
-    std::string note;
-    const DisplayLut lut = bake_ocio_view(setup.ocio, &note);
-    if (!note.empty()) on_log(shared_.get(), CUMULET_LOG_INFO, note.c_str());
-    const cumulet_display_lut_desc lut_desc = desc_of(lut);
-    if (cumulet_set_display_lut(viewer_.get(), &lut_desc) != CUMULET_OK)
-      throw std::runtime_error(cumulet_last_error(viewer_.get()));
-  }
   cumulet_camera* camera = nullptr;
   if (cumulet_get_camera(viewer_.get(), &camera) != CUMULET_OK)
     throw std::runtime_error(cumulet_last_error(viewer_.get()));
@@ -144,6 +137,7 @@ void Session::follow(const DesiredState& desired) {
   follow_analytic_lights();
   give(&SceneOptions::sampling, cumulet_set_sampling);
   give(&SceneOptions::display, cumulet_set_display);
+  follow_ocio();
   if (!(desired_.held && status_.busy)) give(&SceneOptions::grid, cumulet_set_grid);
   if (!same(known_->camera, scene_.camera)) set_camera();
   follow_navigation();
@@ -170,6 +164,25 @@ void Session::follow_ramps() {
     known_->ramps[i] = points;
     check(cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i), settings::numbers_of(points), points.size()));
   }
+}
+
+void Session::follow_ocio() {
+  const OcioView& view = scene_.ocio;
+  if (std::exchange(known_->ocio, view) == view) return;
+  if (!status_.ocio || status_.ocio->config != view.config) status_.ocio.reset();
+  DisplayLut lut;
+  if (!view.config.empty()) {
+    try {
+      if (!status_.ocio) status_.ocio = std::make_shared<const OcioDisplays>(ocio_displays(view.config));
+      std::string note;
+      lut = bake_ocio_view(view, &note);
+      if (!note.empty()) add_notice(false, ocio_text(note));
+    } catch (const std::exception& error) {
+      add_notice(true, ocio_text(error.what()) + ". The tone map is used");
+    }
+  }
+  const cumulet_display_lut_desc desc = desc_of(lut);
+  check(cumulet_set_display_lut(viewer_.get(), lut.values.empty() ? nullptr : &desc));
 }
 
 void Session::follow_analytic_lights() {
@@ -221,7 +234,7 @@ cumulet_frame_desc Session::frame() const {
 bool Session::has_news() const {
   const cumulet_frame_result& frame = status_.frame;
   return frame.width == 0 || (frame.flags & CUMULET_RENDER_NEW_IMAGE) != 0 || drawn_.width != desired_.width ||
-         drawn_.height != desired_.height || !same(drawn_.display, scene_.display);
+         drawn_.height != desired_.height || !same(drawn_.display, scene_.display) || drawn_.ocio != scene_.ocio;
 }
 
 void Session::draw(unsigned framebuffer) {
@@ -234,6 +247,7 @@ void Session::draw(unsigned framebuffer) {
   drawn_.width = desired_.width;
   drawn_.height = desired_.height;
   drawn_.display = scene_.display;
+  drawn_.ocio = scene_.ocio;
 }
 
 std::string Session::write(const PictureFile& file) {

@@ -206,6 +206,8 @@ class Session {
            opening_model_.made.valid();
   }
   void follow_ramps();
+  // Sets the view of OpenColorIO, or none.
+  void follow_ocio();
   void follow_analytic_lights();
   void follow_transforms();
   void follow_surfaces();
@@ -261,6 +263,7 @@ class Session {
     std::uint32_t width = 0;
     std::uint32_t height = 0;
     cumulet_display_desc display{};
+    OcioView ocio;
   } drawn_;
   std::optional<Box> shown_box_;  // bounding box of the displayed volume, if known
   struct WarmUp {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <ocio_lut.hpp>
 #include <string>
 
 namespace cumulet::demo {
@@ -9,7 +8,6 @@ namespace cumulet::demo {
 struct ViewerSetup {
   std::string shader_cache;  // folder; empty: none
   std::string shaders;       // folder; empty: the library's
-  OcioView ocio;
 };
 
 }  // namespace cumulet::demo

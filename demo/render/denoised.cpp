@@ -29,10 +29,24 @@ std::string find_network(const std::string& folder) {
   return file;
 }
 
-std::vector<float> denoised(cumulet_viewer* viewer, const std::string& network, std::size_t floats) {
+Denoiser find_denoiser(const std::string& folder, const std::string& library, std::string& note) {
+  Denoiser denoiser;
+  const std::string named = library.empty() ? environment_variable("CUMULET_OIDN_LIBRARY") : library;
+  if (named != "off") denoiser.library = named;
+  try {
+    denoiser.network = find_network(folder);
+  } catch (const std::exception& error) {
+    const char* const instead = denoiser.library ? " unless the library of Open Image Denoise can be used: " : ": ";
+    note = std::string("using the fast filter") + instead + error.what();
+  }
+  return denoiser;
+}
+
+std::vector<float> denoised(cumulet_viewer* viewer, const Denoiser& denoiser, std::size_t floats) {
   cumulet_denoise_desc desc{};
   desc.struct_size = sizeof desc;
-  if (!network.empty()) desc.network = network.c_str();
+  if (!denoiser.network.empty()) desc.network = denoiser.network.c_str();
+  if (denoiser.library) desc.oidn_library = denoiser.library->c_str();
   std::vector<float> rgba(floats);
   if (cumulet_read_denoised(viewer, &desc, rgba.data(), rgba.size()) != CUMULET_OK) {
     throw std::runtime_error(cumulet_last_error(viewer));

@@ -3,6 +3,7 @@
 #include <cumulet/cumulet.h>
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,19 @@ namespace cumulet::demo {
 /// file does not exist.
 [[nodiscard]] std::string find_network(const std::string& folder);
 
-/// Returns the viewer's image, denoised with the given network. "": with the library's own filter. `floats`: size of
-/// the image, 4 per pixel. Throws std::runtime_error, one line, on failure.
-[[nodiscard]] std::vector<float> denoised(cumulet_viewer* viewer, const std::string& network, std::size_t floats);
+/// What denoises an image. Without both it is the filter of the Cumulet library.
+struct Denoiser {
+  std::string network = {};                 ///< path; "": none
+  std::optional<std::string> library = {};  ///< as cumulet_denoise_desc::oidn_library
+};
+
+/// Returns the denoiser of --denoise high. folder: of the networks, as for find_network. library: a file of Open Image
+/// Denoise's library or "off"; "": $CUMULET_OIDN_LIBRARY, else the installed one. note: receives a line if there is no
+/// network.
+[[nodiscard]] Denoiser find_denoiser(const std::string& folder, const std::string& library, std::string& note);
+
+/// Returns the viewer's denoised image. `floats`: size of the image, 4 per pixel. Throws std::runtime_error, one line,
+/// on failure.
+[[nodiscard]] std::vector<float> denoised(cumulet_viewer* viewer, const Denoiser& denoiser, std::size_t floats);
 
 }  // namespace cumulet::demo

@@ -285,15 +285,13 @@ void print_ending(const RenderOptions& options, Traced traced, double measured, 
                                             options.time_limit, seconds));
 }
 
-/// Returns the denoiser network; "": none is requested, or none exists, which is logged.
-std::string network_of(const RenderOptions& options, Progress& progress) {
-  if (options.denoise != cumulet::demo::Denoise::high) return "";
-  try {
-    return cumulet::demo::find_network(options.denoiser);
-  } catch (const std::exception& error) {
-    print_line(progress, std::string("using --denoise fast: ") + error.what());
-    return "";
-  }
+/// Returns the denoiser of the options. Logs if there is no network for it.
+cumulet::demo::Denoiser denoiser_of(const RenderOptions& options, Progress& progress) {
+  if (options.denoise != cumulet::demo::Denoise::high) return {};
+  std::string note;
+  cumulet::demo::Denoiser denoiser = cumulet::demo::find_denoiser(options.denoiser, options.oidn_library, note);
+  if (!note.empty()) print_line(progress, note);
+  return denoiser;
 }
 
 /// Viewer and scene shared by all images: everything except the volume.
@@ -301,7 +299,7 @@ class Studio {
  public:
   explicit Studio(const RenderOptions& options)
       : fire_look_(options.default_look),
-        network_(network_of(options, progress_)),
+        denoiser_(denoiser_of(options, progress_)),
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
         viewer_(cumulet::demo::create_viewer(context_, messages_, options.trace.empty() ? nullptr : &timeline_,
@@ -390,7 +388,7 @@ class Studio {
   }
 
   void write(const RenderOptions& options) {
-    const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, network_, progress_);
+    const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, denoiser_, progress_);
     progress_.stage("writing " + options.output);
     // The image is written last: if it exists, the other files do too.
     if (!options.stats.empty()) {
@@ -443,7 +441,7 @@ class Studio {
   /// Writes the image so far. A failure is logged, because the disk may have space at the end.
   void write_early(const RenderOptions& options) {
     try {
-      const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, network_, progress_);
+      const std::vector<float> denoised = cumulet::demo::denoise(viewer_, options, denoiser_, progress_);
       write_exposed(options, denoised);
     } catch (const std::exception& error) {
       print_line(progress_, std::string("warning: the image so far was not written: ") + error.what());
@@ -528,10 +526,12 @@ class Studio {
   }
 
   void set_display_lut(const RenderOptions& options) {
-    if (options.lut.empty() && options.ocio.config.empty()) return;
+    const cumulet::demo::OcioView& ocio = options.scene.ocio;
+    // The other formats store linear radiance.
+    if (options.format != OutputFormat::png || (options.lut.empty() && ocio.config.empty())) return;
     std::string note;
-    cumulet::demo::DisplayLut lut = options.lut.empty() ? cumulet::demo::bake_ocio_view(options.ocio, &note)
-                                                        : cumulet::demo::read_cube_lut(options.lut);
+    cumulet::demo::DisplayLut lut =
+        options.lut.empty() ? cumulet::demo::bake_ocio_view(ocio, &note) : cumulet::demo::read_cube_lut(options.lut);
     if (!options.lut.empty()) lut.shaper = options.lut_shaper;
     if (!note.empty()) cumulet::demo::Messages::print(&messages_, CUMULET_LOG_INFO, note.c_str());
     const cumulet_display_lut_desc desc = cumulet::demo::desc_of(lut);
@@ -588,7 +588,7 @@ class Studio {
   cumulet::demo::Messages messages_{progress_};
   Timeline timeline_;
   // Looked up first, so that an error is logged before rendering starts.
-  std::string network_;
+  cumulet::demo::Denoiser denoiser_;
   std::optional<cumulet_medium_desc> fire_;  // set if the volume burns and the scene sets no medium
   Context context_;
   Viewer viewer_;

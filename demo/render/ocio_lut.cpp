@@ -2,6 +2,7 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
@@ -108,6 +109,31 @@ ocio::ConstCPUProcessorRcPtr processor_of(const OcioView& view, std::string* not
 }
 
 }  // namespace
+
+const OcioDisplay* OcioDisplays::find(const std::string& name) const {
+  const auto found = std::ranges::find(displays, name.empty() ? default_display : name, &OcioDisplay::name);
+  return found == displays.end() ? nullptr : &*found;
+}
+
+OcioDisplays ocio_displays(const std::string& file) {
+  OcioDisplays result{.config = file};
+  try {
+    ocio::SetLoggingLevel(ocio::LOGGING_LEVEL_NONE);  // errors are exceptions
+    const ocio::ConstConfigRcPtr config = ocio::Config::CreateFromFile(file.c_str());
+    result.default_display = display_of(*config, {});
+    for (int i = 0; i < config->getNumDisplays(); ++i) {
+      OcioDisplay& display = result.displays.emplace_back(OcioDisplay{config->getDisplay(i)});
+      const char* const name = display.name.c_str();
+      for (int k = 0; k < config->getNumViews(name); ++k) display.views.emplace_back(config->getView(name, k));
+      display.default_view = config->getDefaultView(name);
+    }
+    for (int i = 0; i < config->getNumColorSpaces(); ++i)
+      result.color_spaces.emplace_back(config->getColorSpaceNameByIndex(i));
+  } catch (const std::exception& error) {
+    throw std::runtime_error("--ocio " + file + ": " + error.what());
+  }
+  return result;
+}
 
 DisplayLut bake_ocio_view(const OcioView& view, std::string* note) {
   DisplayLut lut{.size = points,

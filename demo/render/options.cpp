@@ -594,6 +594,10 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
   add_path(app, group, "--oidn-weights", "DIR", options.denoiser,
            "Folder of the Open Image Denoise networks (default: $CUMULET_OIDN_WEIGHTS, else cumulet/oidn below "
            "$XDG_DATA_HOME)");
+  add_path(
+      app, group, "--oidn-library", "FILE|off", options.oidn_library,
+      "Library of Open Image Denoise, which does --denoise high where OpenGL runs on the CPU and needs no networks "
+      "(default: $CUMULET_OIDN_LIBRARY, else libOpenImageDenoise.so.2 if it is installed)");
   add_path(app, group, "--lut", "FILE", options.lut,
            "3D LUT (.cube, at most 65^3 points) that replaces the tone map of .png files (default: none)");
   add_choice(app, group, "--lut-input",
@@ -601,7 +605,7 @@ void add_device_options(CLI::App& app, const char* group, RenderOptions& options
                         Name{"linear", CUMULET_LUT_SHAPER_LINEAR}},
              options.lut_shaper,
              "Values that the LUT maps: the sRGB curve, log2 or the value itself of exposed radiance (default: srgb)");
-  add_ocio_options(app, group, options.ocio);
+  add_ocio_options(app, group, options.scene.ocio);
   add_path(app, group, "--shader-cache", "DIR", options.shader_cache, "Cache compiled shaders in this folder");
   add_path(app, group, "--shaders", "DIR", options.shaders,
            "Load shaders from this folder (a copy of glsl/), to compare variants without a build (default: built in)");
@@ -660,8 +664,15 @@ void make_thumbnail(const CLI::App& app, RenderOptions& options) {
 }  // namespace
 
 void add_ocio_options(CLI::App& app, const char* group, OcioView& view) {
-  add_path(app, group, "--ocio", "FILE", view.config,
-           "OpenColorIO configuration; its view replaces the tone map (default: none)");
+  // A configuration replaces the view of a scene file too.
+  add(
+      app, group, "--ocio", "FILE|none",
+      [&](const std::string& text) {
+        if (text.empty()) throw UsageError("the file's name is empty");
+        view = {};
+        if (text != "none") view.config = text;
+      },
+      "OpenColorIO configuration; its view replaces the tone map (default: none, or as in the scene file)");
   add_text(app, group, "--ocio-display", "NAME", view.display,
            "Display of --ocio (default: that of the configuration)");
   add_text(app, group, "--ocio-view", "NAME", view.view, "View of --ocio (default: that of the display)");
@@ -670,7 +681,8 @@ void add_ocio_options(CLI::App& app, const char* group, OcioView& view) {
            "aces_interchange, and printed)");
 }
 
-void check_ocio_options(const OcioView& view) {
+void finish_ocio_options(const CLI::App& app, OcioView& view) {
+  if (app.count("--tone-map") > 0 && app.count("--ocio") == 0) view = {};
   if (!view.config.empty()) return;
   for (const auto& [flag, name] : {std::pair{"--ocio-display", &view.display}, std::pair{"--ocio-view", &view.view},
                                    std::pair{"--ocio-input", &view.input}})
@@ -724,10 +736,12 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
     throw UsageError("--light-groups needs an .exr output");
   const bool part = app.count("--first-sample") > 0;
   if (!options.lut.empty() && options.format != OutputFormat::png) throw UsageError("--lut needs a .png output");
-  check_ocio_options(options.ocio);
-  if (!options.ocio.config.empty() && options.format != OutputFormat::png)
-    throw UsageError("--ocio needs a .png output");
-  if (!options.ocio.config.empty() && !options.lut.empty()) throw UsageError("--ocio and --lut exclude each other");
+  OcioView& ocio = options.scene.ocio;
+  finish_ocio_options(app, ocio);
+  const bool asks_ocio = app.count("--ocio") > 0 && !ocio.config.empty();
+  if (asks_ocio && options.format != OutputFormat::png) throw UsageError("--ocio needs a .png output");
+  if (asks_ocio && !options.lut.empty()) throw UsageError("--ocio and --lut exclude each other");
+  if (!options.lut.empty()) ocio = {};
   if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   options.denoises_by_default = app.count("--denoise") == 0;
   options.default_look = std::ranges::all_of(look_flags, [&](const char* flag) { return app.count(flag) == 0; });

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "ocio_lut.hpp"
 #include "option_values.hpp"
 
 namespace CLI {
@@ -25,8 +24,9 @@ namespace cumulet::demo {
 void add_scene_options(CLI::App& app, SceneOptions& scene);
 /// Adds --ocio and the flags that choose its view.
 void add_ocio_options(CLI::App& app, const char* group, OcioView& view);
-/// Throws UsageError for flags without --ocio.
-void check_ocio_options(const OcioView& view);
+/// Completes the view after the parse: another tone map or LUT replaces that of a scene file. Throws UsageError for
+/// flags that exclude each other or lack --ocio.
+void finish_ocio_options(const CLI::App& app, OcioView& view);
 /// Kinds of files that were named without a flag.
 struct NamedFiles {
   bool scene = false;  ///< a scene file, which sets the light
@@ -66,13 +66,13 @@ struct RenderOptions {
   Denoise denoise = Denoise::off;          // for .exr, the denoised image is an additional layer
   bool denoises_by_default = false;        // --denoise is not given
   std::string denoiser;                    // folder of networks; empty: denoiser_folder()
+  std::string oidn_library;                // file or "off"; empty: find_denoiser()
   std::vector<cumulet_aov> aovs;           // additional layers of an .exr
   bool cryptomatte = false;                // additional layers of an .exr
   std::optional<std::uint32_t> thumbnail;  // pixels per side
   std::string lut;                         // a .cube file; empty: none
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
   bool default_look = true;  // no flag sets light, exposure or tone map
-  OcioView ocio;
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };

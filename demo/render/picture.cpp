@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "aovs.hpp"
-#include "denoised.hpp"
 #include "metadata.hpp"
 #include "object_name.hpp"
 
@@ -33,12 +32,12 @@ void warn_of_raised_alpha(const Viewer& viewer, const RenderOptions& options, co
 
 }  // namespace
 
-std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, const std::string& network,
+std::vector<float> denoise(const Viewer& viewer, const RenderOptions& options, const Denoiser& denoiser,
                            Progress& progress) {
   if (options.denoise == Denoise::off) return {};
   progress.stage("denoising");
   try {
-    return denoised(viewer.get(), network, std::size_t{4} * options.scene.width * options.scene.height);
+    return denoised(viewer.get(), denoiser, std::size_t{4} * options.scene.width * options.scene.height);
   } catch (const std::exception& error) {
     print_line(progress, std::string("not denoised: ") + error.what());
     return {};

@@ -6,8 +6,18 @@
 
 namespace cumulet::demo {
 
-DisplayLut bake_ocio_view(const OcioView& view, std::string* /*note*/) {
-  throw std::runtime_error("--ocio " + view.config + ": this program was built without OpenColorIO (CUMULET_OCIO)");
+namespace {
+
+[[noreturn]] void refuse(const std::string& config) {
+  throw std::runtime_error("--ocio " + config + ": this program was built without OpenColorIO (CUMULET_OCIO)");
 }
+
+}  // namespace
+
+const OcioDisplay* OcioDisplays::find(const std::string& /*name*/) const { return nullptr; }
+
+OcioDisplays ocio_displays(const std::string& config) { refuse(config); }
+
+DisplayLut bake_ocio_view(const OcioView& view, std::string* /*note*/) { refuse(view.config); }
 
 }  // namespace cumulet::demo

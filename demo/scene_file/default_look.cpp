@@ -55,7 +55,7 @@ bool is_default_exposure(const SceneOptions& scene, std::optional<float> measure
 }
 
 bool take_dusk(SceneOptions& scene, std::optional<float> measured) {
-  if (!has_light(scene, daylight()) || !scene.environment.empty()) return false;
+  if (!has_light(scene, daylight()) || !scene.environment.empty() || !scene.ocio.config.empty()) return false;
   if (!is_display(scene, 0.0F, measured, CUMULET_TONE_MAP_NEUTRAL)) return false;
   scene.light = dusk();
   scene.display.exposure_stops = dusk_exposure;

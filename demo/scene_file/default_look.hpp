@@ -21,7 +21,7 @@ void give_daylight(SceneOptions& scene);
 /// exposure, in stops, also below.
 [[nodiscard]] bool is_default_exposure(const SceneOptions& scene, std::optional<float> measured);
 /// Sets dusk light with the filmic tone map and a matching exposure, in which flames look bright, if the scene has the
-/// default daylight and display. Returns true if it did.
+/// default daylight and display and no view of OpenColorIO. Returns true if it did.
 bool take_dusk(SceneOptions& scene, std::optional<float> measured = std::nullopt);
 /// Sets the default daylight and display again if the scene has those of take_dusk. Returns true if it did.
 bool give_day(SceneOptions& scene, std::optional<float> measured = std::nullopt);

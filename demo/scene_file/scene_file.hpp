@@ -15,6 +15,7 @@
 
 #include "keys.hpp"
 #include "names.hpp"
+#include "ocio_view.hpp"
 
 namespace cumulet::demo {
 
@@ -133,6 +134,7 @@ struct SceneOptions : SceneVolume, SceneCamera {
   cumulet_surface_settings_desc surface{};
   cumulet_sampling_desc sampling{};
   cumulet_display_desc display{};
+  OcioView ocio;                          // its view replaces the tone map
   std::vector<std::string> light_groups;  // names of the separate light groups, starting at group 0
 
   SceneOptions();

@@ -587,6 +587,14 @@ void read_lists(Reader& reader, SceneFormat format, SceneOptions& scene) {
   read_sequence(reader, scene.sequence);
 }
 
+void read_ocio(Reader& reader, OcioView& view) {
+  reader.text("display.ocio.config", view.config);
+  reader.text("display.ocio.display", view.display);
+  reader.text("display.ocio.view", view.view);
+  reader.text("display.ocio.input", view.input);
+  if (view.config.empty() && view != OcioView()) reader.wrong("display.ocio.config", "is missing");
+}
+
 void read_scene(Reader& reader, SceneOptions& scene) {
   const SceneFormat format = read_version(reader);
   const bool has_lists = format != SceneFormat::first;
@@ -608,6 +616,7 @@ void read_scene(Reader& reader, SceneOptions& scene) {
   reader.names("picture.light_groups", scene.light_groups);
   if (const std::string why = light_groups_refusal(scene.light_groups); !why.empty())
     reader.wrong("picture.light_groups", why);
+  read_ocio(reader, scene.ocio);
   const bool names_criterion = reader.has("grid.criterion");
   for_each_group(scene, [&](auto& group) { read_settings(reader, group); });
   if (names_criterion) settings::name_criterion(scene.grid);
@@ -650,6 +659,7 @@ SceneOptions parse_scene(const std::string& text, const std::string& path) {
   find(scene.surfaces);
   for (SceneModel& model : scene.models) find(model.file);
   find(scene.environment);
+  if (is_config_file(scene.ocio.config)) find(scene.ocio.config);
   return scene;
 }
 

@@ -266,6 +266,12 @@ Json to_json(const SceneOptions& scene, SceneFormat format, const Named& named) 
   writer.put_settings(scene.sampling);
   if (!scene.light_groups.empty()) writer.put("picture.light_groups", scene.light_groups);
   writer.put_settings(scene.display);
+  if (has_lists && !scene.ocio.config.empty()) {
+    writer.put("display.ocio.config", is_config_file(scene.ocio.config) ? named(scene.ocio.config) : scene.ocio.config);
+    writer.put_text("display.ocio.display", scene.ocio.display);
+    writer.put_text("display.ocio.view", scene.ocio.view);
+    writer.put_text("display.ocio.input", scene.ocio.input);
+  }
   Json json = writer.take();
   if (settings::criterion_of(scene.grid) != scene.grid.criterion) json["grid"].erase("criterion");
   return json;

@@ -683,7 +683,7 @@ cumulet_status cumulet_read_denoised(cumulet_viewer* viewer, const cumulet_denoi
     const cumulet_denoise_desc d = read_desc(desc, "cumulet_denoise_desc");
     require(d.network == nullptr || *d.network != '\0', "network is empty");
     require(rgba != nullptr, "rgba is NULL");
-    v.read_denoised(d.network, rgba, count);
+    v.read_denoised(d.network, d.oidn_library, rgba, count);
   });
 }
 

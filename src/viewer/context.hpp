@@ -15,6 +15,7 @@
 #include "base/revision.hpp"
 #include "base/slot.hpp"
 #include "denoise/network.hpp"
+#include "denoise/oidn_library.hpp"
 #include "gl/programs.hpp"
 #include "gl/share_group.hpp"
 #include "render/dynamic/voxel_transfers.hpp"
@@ -55,6 +56,14 @@ struct Shot {
   std::uint64_t settings = 0;  // revision of all settings; failed work is retried when it changes
 
   [[nodiscard]] const std::optional<scene::Viewpoint>& view() const { return *scene->view; }
+};
+
+/// What denoises an image that is read back: a library, else a network, else the real-time filter.
+struct Denoisers {
+  denoise::NetworkPtr network;
+  denoise::OidnLibraryPtr library;
+
+  [[nodiscard]] bool any() const { return network != nullptr || library != nullptr; }
 };
 
 /// A color behind an image. Pixels outside of the box have none.
@@ -141,7 +150,7 @@ class Context {
   [[nodiscard]] bool can_denoise(const render::Picture& picture) const;
   /// Reads the denoised image; only for shaded images with traced surfaces. Throws Error(unsupported) for others.
   /// Without a network it uses the real-time filter.
-  void read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count);
+  void read_denoised(const Shot& shot, const Denoisers& by, float* rgba, std::size_t count);
   /// Read without waiting. number: of the read, a new one. Throws Error(invalid_argument) for values that samples do
   /// not accumulate, and if too many reads are pending.
   void begin_read(const DisplaySettings& settings, const ReadRequest& request, std::uint64_t number);
@@ -221,7 +230,7 @@ class Context {
   // Throws if the displayed data differs from that of the image, or if `also` is false.
   void require_present(bool also) const;
   // Returns the image denoised by the network, row 0 at the top. The image must have its feature buffers.
-  gl::Object by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network);
+  gl::Object by_network(const Shot& shot, const render::Picture& picture, const Denoisers& by);
   gl::Object filtered(const render::Picture& picture, bool with_background);
   // Mean radiance, with or without that of the background, and alpha, including surfaces drawn beneath a preview.
   // drawn: receives the textures that are drawn for it, which must live until the values were copied.

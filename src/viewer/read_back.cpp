@@ -272,7 +272,7 @@ bool Context::can_denoise(const render::Picture& picture) const {
          progressive_.newest_is_of(scene_.data_revision(), scene_.instances_revision());
 }
 
-void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network, float* rgba, std::size_t count) {
+void Context::read_denoised(const Shot& shot, const Denoisers& by, float* rgba, std::size_t count) {
   render::Picture& picture = readable();
   if (!is_traced(picture)) {
     throw Error(ErrorCode::unsupported, "only shaded images with path-traced surfaces can be denoised");
@@ -280,10 +280,9 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
   require_floats(rgba, count, pixels_of(picture) * 4);
   find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture));
   const render::Display display = shot.display.shown(false);
-  const gl::Object denoised =
-      network != nullptr ? by_network(shot, picture, network) : filtered(picture, display.shows_background());
+  const gl::Object denoised = by.any() ? by_network(shot, picture, by) : filtered(picture, display.shows_background());
   const glm::uvec2 size = picture.size();
-  const render::PixelBox box = network != nullptr ? picture.box() : render::PixelBox{glm::uvec2(0U), size};
+  const render::PixelBox box = by.any() ? picture.box() : render::PixelBox{glm::uvec2(0U), size};
   std::vector<glm::vec4> pixels(box.area());
   functions_->GetTextureImage(denoised.name(), 0, GL_RGBA, GL_FLOAT,
                               static_cast<GLsizei>(pixels.size() * sizeof(glm::vec4)), pixels.data());
@@ -296,10 +295,11 @@ void Context::read_denoised(const Shot& shot, const denoise::NetworkPtr& network
   backdrop_of(display, picture).put_behind({rgba, pixels_of(picture) * 4});
 }
 
-gl::Object Context::by_network(const Shot& shot, const render::Picture& picture, const denoise::NetworkPtr& network) {
+gl::Object Context::by_network(const Shot& shot, const render::Picture& picture, const Denoisers& by) {
   const std::vector<scene::Volume>& volumes = shot.scene->volumes;
   render::Denoising denoising;
-  denoising.network = network;
+  denoising.network = by.network;
+  denoising.library = by.library;
   denoising.with_background = shot.display.shown(false).shows_background();
   if (!volumes.empty()) denoising.medium_albedo = (*volumes.front().medium).albedo;
   denoising.known_light = !shot.scene->models.empty() || std::ranges::any_of(volumes, [](const scene::Volume& volume) {

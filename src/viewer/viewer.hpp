@@ -16,6 +16,7 @@
 #include "base/log.hpp"
 #include "base/trace.hpp"
 #include "denoise/network_cache.hpp"
+#include "denoise/oidn_cache.hpp"
 #include "jobs/jobs.hpp"
 #include "stage/stage.hpp"
 #include "viewer/attached_context.hpp"
@@ -203,9 +204,10 @@ class Viewer final : private StageHost {
   ReadState finish_read(std::uint64_t read, float* values, std::size_t count);
   void cancel_read(std::uint64_t read);
   void read_display(std::uint8_t* rgba, std::size_t count);
-  /// network_file: denoiser weights, which stay in memory; null: use the real-time filter. Throws Error(file) if the
-  /// file is invalid.
-  void read_denoised(const char* network_file, float* rgba, std::size_t count);
+  /// network_file: denoiser weights, which stay in memory; null: use the real-time filter. oidn_library: is used in its
+  /// place on drivers that compute on the CPU, if it can be used; null: none. Throws Error(file) if the weights are
+  /// invalid.
+  void read_denoised(const char* network_file, const char* oidn_library, float* rgba, std::size_t count);
   /// Converts the result of read_linear() to the result of read_display().
   void encode_display(std::span<const float> linear, std::span<std::uint8_t> rgba) const;
   void read_aov(Aov aov, float* values, std::size_t count);
@@ -291,6 +293,7 @@ class Viewer final : private StageHost {
   Sampling sampling_;
   DisplaySettings display_;
   denoise::NetworkCache networks_;
+  denoise::OidnCache oidn_;
   std::optional<std::uint64_t> remarked_picture_;  // the last image with a warning about its samples
   render::Totals totals_;
   std::uint64_t last_read_ = 0;  // number of the last begin_read()

@@ -363,10 +363,22 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
   });
 }
 
-void Viewer::read_denoised(const char* network_file, float* rgba, std::size_t count) {
+void Viewer::read_denoised(const char* network_file, const char* oidn_library, float* rgba, std::size_t count) {
   in_context([&](Context& g) {
-    const denoise::NetworkPtr network = network_file != nullptr ? networks_.get(network_file) : nullptr;
-    g.read_denoised(shot_now(), network, rgba, count);
+    Denoisers by;
+    if (oidn_library != nullptr && g.functions()->dispatches_in_call) by.library = oidn_.get(oidn_library, log_);
+    const auto read = [&] {
+      // A library needs no weights, and reads none that are missing.
+      if (by.library == nullptr && network_file != nullptr) by.network = networks_.get(network_file);
+      g.read_denoised(shot_now(), by, rgba, count);
+    };
+    try {
+      read();
+    } catch (const denoise::OidnError& error) {
+      oidn_.drop(error, log_);
+      by.library = nullptr;
+      read();
+    }
     totals_ = g.totals();
   });
 }
@@ -392,7 +404,7 @@ void Viewer::read_display(std::uint8_t* rgba, std::size_t count) {
       throw Error(ErrorCode::invalid_argument, "the image needs " + std::to_string(values) + " bytes");
     linear.resize(values);
     if (shot.display.denoise && g.can_denoise(picture)) {
-      g.read_denoised(shot, nullptr, linear.data(), values);
+      g.read_denoised(shot, {}, linear.data(), values);
     } else {
       g.read_linear(shot.display, linear.data(), values);
     }

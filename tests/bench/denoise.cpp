@@ -61,7 +61,8 @@ class Pictures {
   std::vector<float> take(Method method, std::vector<double>* seconds = nullptr) {
     if (method == Method::raw) return stage_.linear();
     const auto start = std::chrono::steady_clock::now();
-    std::vector<float> rgba = demo::denoised(stage_.viewer(), method == Method::high ? network_ : "", stage_.floats());
+    std::vector<float> rgba =
+        demo::denoised(stage_.viewer(), {.network = method == Method::high ? network_ : ""}, stage_.floats());
     if (seconds != nullptr)
       seconds->push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     return rgba;

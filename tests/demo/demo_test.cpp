@@ -302,6 +302,9 @@ TEST(DemoModel, DuskReplacesOnlyTheDefaultLook) {
   EXPECT_TRUE(take_dusk(unsaid));
   EXPECT_EQ(unsaid.light.sun_elevation_degrees, 3.0f);
   EXPECT_EQ(unsaid.display.tone_map, CUMULET_TONE_MAP_FILMIC);
+  SceneOptions viewed = day;
+  viewed.ocio.config = "a.ocio";
+  EXPECT_FALSE(take_dusk(viewed)) << "the view replaces the tone map";
   // The environment is the light.
   SceneOptions surrounded = day;
   surrounded.environment = "sky.hdr";
@@ -360,7 +363,7 @@ TEST(DemoOptions, AcceptSceneFlagsAndAFile) {
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--shader-cache", ""}, out)), UsageError);
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--shaders", ""}, out)), UsageError);
   EXPECT_EQ(parse_demo_options({"--shader-cache", "kept"}, out)->viewer.shader_cache, "kept");
-  EXPECT_EQ(parse_demo_options({"--ocio", "a.ocio", "--ocio-view", "Film"}, out)->viewer.ocio.view, "Film");
+  EXPECT_EQ(parse_demo_options({"--ocio", "a.ocio", "--ocio-view", "Film"}, out)->scene.ocio.view, "Film");
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--ocio-view", "Film"}, out)), UsageError);
 }
 

@@ -60,4 +60,5 @@ def main():
     assert "no such.ocio" in refused("--ocio", out / "no such.ocio")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -547,7 +547,7 @@ TEST(Menus, ReachEveryAction) {
       Action::add_volume,      Action::add_model, Action::save_scene_as,  Action::save_png,    Action::save_exr,
       Action::discard_changes, Action::recover,   Action::cancel,         Action::choose_grid, Action::discard_recovery,
       Action::clear_log,       Action::render,    Action::show_in_folder, Action::quit_anyway, Action::cancel_render,
-      Action::clear_renders,   Action::daylight,  Action::open_sample};
+      Action::clear_renders,   Action::daylight,  Action::open_sample,    Action::ocio_dialog, Action::open_ocio};
   for (int i = 0; i <= static_cast<int>(Action::daylight); ++i) {
     const auto action = static_cast<Action>(i);
     const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {

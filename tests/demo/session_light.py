@@ -1,9 +1,11 @@
 """Tests of session.py: light, environments, emission and the display of colors."""
 
+import json
 import math
 import subprocess
 
 from demo_session import assert_alike, assert_differ, assert_drawn, assert_saved, look, SETTLE, shot, shown, tab
+from ocio import CONFIG
 from png import Picture, difference
 
 
@@ -307,6 +309,40 @@ def test_first_view(s):
     subprocess.run([s.renderer, s.cumulus, "--density-scale", "1", "--max-bounces", "8", "--denoise", "off", "--spp", "8",
                     "--size", f"{int(width)}x{int(height)}", "-o", file], check=True, timeout=600)
     assert_saved(picture, Picture(file), area)
+
+
+def test_ocio(s):
+    """A view of OpenColorIO replaces the tone map, is an undo step and part of the scene. A configuration that cannot
+    be read is one message."""
+    (s.out / "config.ocio").write_text(CONFIG)
+    (s.out / "wrong.ocio").write_text("ocio_profile_version: 2\ndisplays: [")
+    s.environment["OCIO"] = str(s.out / "config.ocio")
+    opened = lambda file: ['click "Open configuration"', "frames 3", f'text "{s.out}/{file}"', "key enter", *SETTLE, "frames 3"]
+    chosen = lambda what: [f'click "{what.split("/")[0]}"', "frames 2", f'click "{what}"', *SETTLE, "frames 3"]
+    s.play("replay", ["wait loaded", "wait converged", *shown("Render"), *chosen("Tone map/Clip"), *shot("clip"), *opened("config.ocio"), *shot("plain"),
+                      *chosen("Display view/Exchanged"), *shot("exchanged"), "key ctrl+z", *SETTLE, *shot("undone"), "key ctrl+shift+z", *SETTLE,
+                      *opened("wrong.ocio"), *shot("wrong"), 'click "Remove configuration"', *SETTLE, *shot("removed"),
+                      'click "Use $OCIO"', *SETTLE, "frames 3", *shot("variable")],
+           "--volume", s.cumulus)
+    view = lambda name: s.report(name)["ocio"]
+    assert view("clip") is None and view("plain") == {"config": "config.ocio"}, view("plain")
+    assert view("exchanged")["view"] == "Exchanged" and view("undone") == view("plain") == view("variable"), view("undone")
+    assert view("wrong") == view("exchanged"), "the configuration in use stays"
+    errors = [m["text"] for m in s.report("wrong")["messages"] if m["error"]]
+    assert len(errors) == 1 and "wrong.ocio" in errors[0], errors
+    assert view("removed") is None
+    clip, report, area = look(s, "clip")
+    area = (area[0], area[1], area[2], 100)  # above the messages
+    assert difference(clip, look(s, "plain")[0], area)[1] <= 1, "the view only encodes"
+    assert_alike(look(s, "plain")[0], look(s, "undone")[0], area)
+    red, blue = (sum(b[i] for b in look(s, "exchanged")[0].blocks(area)) for i in (0, 2))
+    plain_red, plain_blue = (sum(b[i] for b in clip.blocks(area)) for i in (0, 2))
+    assert abs(red - plain_blue) < 0.02 * plain_blue and abs(blue - plain_red) < 0.02 * plain_red and plain_blue > plain_red, (red, blue)
+    assert s.report("exchanged")["samples"] == report["samples"], "a view restarts nothing"
+    (s.out / "scene.json").write_text(json.dumps({"cumulet_scene": 3, "volumes": [{"file": s.cumulus}],
+                                                  "display": {"ocio": {"config": "config.ocio", "view": "Exchanged"}}}))
+    s.play("saved", ["wait loaded", "frames 3", *shot("saved")], "--scene", str(s.out / "scene.json"))
+    assert view("saved") == view("exchanged"), "scene files have the view"
 
 
 def test_exposure(s):

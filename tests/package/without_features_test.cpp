@@ -43,8 +43,9 @@ TEST(WithoutFeatures, FilesAreRefusedWithTheOption) {
   const std::string webp = "is a WebP image, which this build of Cumulet does not read (CUMULET_WEBP=OFF)";
   EXPECT_EQ(error_of([] { (void)read_webp_size({}); }), webp);
   EXPECT_EQ(error_of([] { (void)decode_webp({}, {}); }), webp);
-  EXPECT_EQ(error_of([] { (void)cumulet::demo::bake_ocio_view({.config = "a.ocio"}); }),
-            "--ocio a.ocio: this program was built without OpenColorIO (CUMULET_OCIO)");
+  const std::string ocio = "--ocio a.ocio: this program was built without OpenColorIO (CUMULET_OCIO)";
+  EXPECT_EQ(error_of([] { (void)cumulet::demo::bake_ocio_view({.config = "a.ocio"}); }), ocio);
+  EXPECT_EQ(error_of([] { (void)cumulet::demo::ocio_displays("a.ocio"); }), ocio);
 }
 
 }  // namespace

@@ -19,6 +19,9 @@ namespace {
 
 using cumulet::demo::bake_ocio_view;
 using cumulet::demo::DisplayLut;
+using cumulet::demo::ocio_displays;
+using cumulet::demo::OcioDisplay;
+using cumulet::demo::OcioDisplays;
 using cumulet::demo::OcioView;
 
 /// Linear Rec. 709 of ACES2065-1 by the Bradford transform, as published with ACES.
@@ -137,6 +140,30 @@ TEST_F(OcioLut, RadianceIsLinearRec709) {
   EXPECT_LT(greatest_error(bake_ocio_view({.config = unknown, .input = "working"}), plain), 0.5);
   EXPECT_EQ(refusal({.config = unknown}),
             "--ocio " + unknown + ": it names no color space of linear Rec. 709: choose one by --ocio-input");
+}
+
+TEST_F(OcioLut, DisplaysAreListed) {
+  const std::string config = write(config_text("lin_rec709", nothing));
+  const OcioDisplays displays = ocio_displays(config);
+  EXPECT_EQ(displays.config, config);
+  ASSERT_EQ(displays.displays.size(), 2U);
+  EXPECT_EQ(displays.default_display, "Plain");
+  const OcioDisplay* const plain = displays.find("");
+  ASSERT_NE(plain, nullptr);
+  EXPECT_EQ(plain->name, "Plain");
+  EXPECT_EQ(plain->views, (std::vector<std::string>{"Encoded", "Linear"}));
+  EXPECT_EQ(plain->default_view, "Encoded");
+  EXPECT_EQ(displays.find("Other")->views, std::vector<std::string>{"Exchanged"});
+  EXPECT_EQ(displays.find("none"), nullptr);
+  EXPECT_EQ(displays.color_spaces, (std::vector<std::string>{"reference", "lin_rec709", "encoded", "exchanged"}));
+  for (const std::string& wrong : {std::string("no such.ocio"), write("ocio_profile_version: 2\n")}) {
+    try {
+      static_cast<void>(ocio_displays(wrong));
+      ADD_FAILURE() << wrong;
+    } catch (const std::runtime_error& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with("--ocio " + wrong + ": ")) << error.what();
+    }
+  }
 }
 
 TEST_F(OcioLut, RefusalsNameTheChoices) {

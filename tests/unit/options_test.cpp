@@ -291,8 +291,8 @@ TEST(Options, ALutIsForPngs) {
 
 TEST(Options, AnOcioViewIsForPngs) {
   const RenderOptions options = parse({"--ocio", "a.ocio", "--ocio-display", "sRGB", "--ocio-view", "Film"});
-  EXPECT_EQ(options.ocio, (OcioView{.config = "a.ocio", .display = "sRGB", .view = "Film"}));
-  EXPECT_EQ(parse({"--ocio", "a.ocio", "--ocio-input", "lin"}).ocio.input, "lin");
+  EXPECT_EQ(options.scene.ocio, (OcioView{.config = "a.ocio", .display = "sRGB", .view = "Film"}));
+  EXPECT_EQ(parse({"--ocio", "a.ocio", "--ocio-input", "lin"}).scene.ocio.input, "lin");
   EXPECT_EQ(usage_error(with({"--ocio", "a.ocio", "-o", "a.exr"})), "--ocio needs a .png output");
   EXPECT_EQ(usage_error(with({"--ocio", "a.ocio", "--lut", "a.cube"})), "--ocio and --lut exclude each other");
   EXPECT_EQ(usage_error(with({"--ocio-view", "Film"})), "--ocio-view needs --ocio");

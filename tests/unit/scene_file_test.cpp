@@ -113,6 +113,20 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.display, scene.display));
 }
 
+TEST(SceneFile, KeepsTheViewOfOpenColorIo) {
+  SceneOptions scene = full_scene();
+  scene.ocio = {.config = "/p/show/config.ocio", .display = "sRGB", .view = "Film \"A\"", .input = "lin"};
+  const auto again = [&](const std::string& path) { return parse_scene(scene_text(scene, path), path).ocio; };
+  EXPECT_EQ(again("/p/s.json"), scene.ocio);
+  EXPECT_NE(scene_text(scene, "/p/s.json").find("\"show/config.ocio\""), std::string::npos);
+  EXPECT_EQ(again("/q/s.json"), scene.ocio);
+  EXPECT_FALSE(same_scene(scene, full_scene()));
+  scene.ocio = {.config = "ocio://default"};
+  EXPECT_EQ(again("/p/s.json"), scene.ocio) << "no file";
+  EXPECT_THROW(static_cast<void>(parse_scene(with(R"("display": {"ocio": {"view": "Film"}})"), "s.json")),
+               std::runtime_error);
+}
+
 TEST(SceneFile, SupportsAnyNumberOfVolumes) {
   SceneOptions scene = full_scene();
   scene.name = "the large one";

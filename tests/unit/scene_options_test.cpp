@@ -62,6 +62,27 @@ TEST_F(SceneOption, FlagsOverrideTheSceneFileInAnyOrder) {
   EXPECT_EQ(mixed->scene.display.exposure_stops, 2.0f);
 }
 
+TEST_F(SceneOption, FlagsReplaceTheViewOfOpenColorIo) {
+  const std::string path = write_scene(R"({"cumulet_scene": 3, "volumes": [{"file": "/a/smoke.vdb"}],
+    "display": {"ocio": {"config": "/a/show.ocio", "display": "sRGB", "view": "Film"}}})");
+  const auto ocio = [&](const Arguments& more) {
+    Arguments all = {"--scene", path, "-o", "a.png"};
+    all.insert(all.end(), more.begin(), more.end());
+    std::ostringstream out;
+    return parse_render_options(all, out)->scene.ocio;
+  };
+  const OcioView scenes{.config = "/a/show.ocio", .display = "sRGB", .view = "Film"};
+  EXPECT_EQ(ocio({}), scenes);
+  EXPECT_EQ(ocio({"-o", "a.exr"}), scenes) << "is not used";
+  EXPECT_EQ(ocio({"--ocio-view", "Raw"}).view, "Raw");
+  EXPECT_EQ(ocio({"--ocio", "b.ocio"}), OcioView{.config = "b.ocio"}) << "its own default view";
+  EXPECT_EQ(ocio({"--ocio-view", "Raw", "--ocio", "b.ocio"}), (OcioView{.config = "b.ocio", .view = "Raw"}));
+  for (const Arguments& none : {Arguments{"--ocio", "none"}, {"--tone-map", "clip"}, {"--lut", "a.cube"}})
+    EXPECT_EQ(ocio(none), OcioView()) << none.front();
+  EXPECT_EQ(usage_error({"--scene", path, "-o", "a.png", "--ocio", "none", "--ocio-view", "Raw"}),
+            "--ocio-view needs --ocio");
+}
+
 TEST_F(SceneOption, OnlyOptionsOfTheLookSetTheLook) {
   const auto by_default = [](const Arguments& more) {
     std::ostringstream out;

@@ -3906,6 +3906,14 @@ typedef struct cumulet_denoise_desc {
                             whose name begins with rt_hdr. The library contains none
                             (scripts/install_oidn_weights.sh). NULL: the filter of CUMULET_DENOISE_FAST, which needs
                             none. */
+  /**
+   * UTF-8 file name of the library of Intel's Open Image Denoise, version 1.4 or later, which has its own network.
+   * "": its usual names (libOpenImageDenoise.so.2, libOpenImageDenoise.so.1). NULL: no library.
+   *
+   * It is used in place of `network` where the driver computes on the CPU, and is loaded by the first such call. The
+   * log says once which version denoises, or why the library cannot be used; `network` is used then.
+   */
+  const char* oidn_library;
 } cumulet_denoise_desc;
 
 /**
@@ -3915,6 +3923,8 @@ typedef struct cumulet_denoise_desc {
  *
  * - With a network: shaders in this context compute it, with up to 512 MiB of GL memory and 80 bytes per pixel during
  *   the call. The call waits for them and for their compiler: 20 to 90 seconds per megapixel on software drivers.
+ * - With a library: its threads compute it while the call waits. It takes 160 bytes per pixel and the library's own
+ *   memory. The result depends on the library's version. The process keeps the library.
  * - It takes twice as long if the scene has surfaces or emissive media. The noise-free component is subtracted first,
  *   and the positive and the negative residual are denoised separately.
  * - Without a network: the filter also denoises alpha. It takes 128 bytes per pixel, and one or two seconds per
@@ -3925,7 +3935,7 @@ typedef struct cumulet_denoise_desc {
  * Threads: any thread with the context.
  *
  * @param viewer An attached viewer.
- * @param desc   The network file.
+ * @param desc   The network file and the library.
  * @param rgba   Receives width x height x 4 floats, first pixel top left.
  * @param count  Floats at rgba.
  * @return CUMULET_OK; CUMULET_ERROR_FILE for a missing or unsuitable network file; CUMULET_ERROR_UNSUPPORTED for debug

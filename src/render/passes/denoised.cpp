@@ -1,5 +1,10 @@
 #include "render/passes/denoised.hpp"
 
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
 #include "denoise/denoiser.hpp"
 #include "gl/bindings.hpp"
 #include "shader_macros.hpp"
@@ -15,6 +20,37 @@ gl::ProgramKey guides_key(const Denoising& denoising) {
   return {"denoise_guides.comp",
           {gl::macros::background(denoising.with_background), gl::macros::known(denoising.known_light)}};
 }
+
+std::vector<glm::vec4> read(const gl::Functions& gl, const gl::Object& texture, glm::uvec2 size) {
+  std::vector<glm::vec4> pixels(std::size_t{size.x} * size.y);
+  gl.GetTextureImage(texture.name(), 0, GL_RGBA, GL_FLOAT, static_cast<GLsizei>(pixels.size() * sizeof(glm::vec4)),
+                     pixels.data());
+  return pixels;
+}
+
+/// The guides in main memory, for a library.
+class LibraryGuides {
+ public:
+  LibraryGuides(gl::FunctionsPtr gl, glm::uvec2 size, const gl::Object& albedo, const gl::Object& normal)
+      : gl_(std::move(gl)), size_(size), albedo_(read(*gl_, albedo, size)), normal_(read(*gl_, normal, size)) {}
+
+  /// Denoises one texture into another one.
+  void denoise(const denoise::OidnLibrary& library, const gl::Object& from, const gl::Object& to) const {
+    const std::vector<glm::vec4> color = read(*gl_, from, size_);
+    gl::check(*gl_, "reading the denoiser's input");
+    std::vector<glm::vec4> result(color.size());
+    library.denoise({size_, color, albedo_, normal_}, result);
+    gl_->TextureSubImage2D(to.name(), 0, 0, 0, static_cast<GLsizei>(size_.x), static_cast<GLsizei>(size_.y), GL_RGBA,
+                           GL_FLOAT, result.data());
+    gl::check(*gl_, "uploading the denoised image");
+  }
+
+ private:
+  gl::FunctionsPtr gl_;
+  glm::uvec2 size_;
+  std::vector<glm::vec4> albedo_;
+  std::vector<glm::vec4> normal_;
+};
 
 }  // namespace
 
@@ -34,7 +70,7 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   if (denoising.known_light) missing = make("creating the negative residual for the denoiser");
 
   const Film& film = picture.film();
-  const auto read = [&](GLint unit, const FilmLayer& layer) {
+  const auto bind = [&](GLint unit, const FilmLayer& layer) {
     gl->BindTextureUnit(static_cast<GLuint>(unit), film.texture(layer));
   };
   const auto write = [&](GLint unit, const gl::Object& texture, GLenum access = GL_WRITE_ONLY) {
@@ -48,13 +84,13 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   };
 
   const gl::Program& guides = programs->get(guides_key(denoising));
-  read(core::CM_UNIT_SUM, film_layers::radiance);
-  read(core::CM_UNIT_COUNTS, film_layers::counts);
-  read(core::CM_UNIT_BACKGROUND, film_layers::background);
-  read(core::CM_UNIT_GUIDE_ALBEDO, film_layers::albedo);
-  read(core::CM_UNIT_GUIDE_NORMAL, film_layers::normal);
-  read(core::CM_UNIT_GUIDE_TRANSMITTANCE, film_layers::transmittance);
-  read(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
+  bind(core::CM_UNIT_SUM, film_layers::radiance);
+  bind(core::CM_UNIT_COUNTS, film_layers::counts);
+  bind(core::CM_UNIT_BACKGROUND, film_layers::background);
+  bind(core::CM_UNIT_GUIDE_ALBEDO, film_layers::albedo);
+  bind(core::CM_UNIT_GUIDE_NORMAL, film_layers::normal);
+  bind(core::CM_UNIT_GUIDE_TRANSMITTANCE, film_layers::transmittance);
+  bind(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
   write(core::CM_IMAGE_GUIDE_COLOR, color);
   write(core::CM_IMAGE_GUIDE_ALBEDO, albedo);
   write(core::CM_IMAGE_GUIDE_NORMAL, normal);
@@ -64,11 +100,18 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
   gl->ProgramUniform2i(guides.name(), 1, first.x, first.y);
   dispatch(guides, "computing the denoiser's guides");
 
-  denoise::Denoiser denoiser(gl, programs, denoising.network, denoising.max_bytes);
+  std::optional<denoise::Denoiser> denoiser;
+  std::optional<LibraryGuides> by_library;
+  if (denoising.library != nullptr) {
+    by_library.emplace(gl, size, albedo, normal);
+  } else {
+    denoiser.emplace(gl, programs, denoising.network, denoising.max_bytes);
+  }
   const auto denoise = [&](const gl::Object& from, const gl::Object& to) {
-    denoiser.begin({size, from.name(), albedo.name(), normal.name(), to.name()});
-    denoiser.build();
-    while (!denoiser.step(step_multiply_adds)) {
+    if (by_library) return by_library->denoise(*denoising.library, from, to);
+    denoiser->begin({size, from.name(), albedo.name(), normal.name(), to.name()});
+    denoiser->build();
+    while (!denoiser->step(step_multiply_adds)) {
     }
   };
   denoise(color, result);
@@ -77,8 +120,8 @@ gl::Object denoised(const gl::FunctionsPtr& gl, const gl::ProgramsPtr& programs,
 
   const gl::Program& known = programs->get({"denoise_known.comp", {}});
   gl->BindTextureUnit(core::CM_UNIT_DENOISE_COLOR, color.name());
-  read(core::CM_UNIT_GUIDE_TRANSMITTANCE, film_layers::transmittance);
-  read(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
+  bind(core::CM_UNIT_GUIDE_TRANSMITTANCE, film_layers::transmittance);
+  bind(core::CM_UNIT_GUIDE_EMISSION, film_layers::emission);
   write(core::CM_IMAGE_DENOISED, result, GL_READ_WRITE);
   gl->ProgramUniform2i(known.name(), 0, first.x, first.y);
   dispatch(known, "adding the noise-free component");
