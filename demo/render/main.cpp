@@ -124,7 +124,7 @@ void wait(const Viewer& viewer, Progress& progress) {
 
 /// Returns the default medium of a burning volume if the scene sets no medium; nullopt if the volume does not burn.
 std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
-  if (!scene.is_shown() || !scene.auto_density_scale || !cumulet::demo::is_unsaid(scene.medium)) return std::nullopt;
+  if (!cumulet::demo::sets_no_medium(scene)) return std::nullopt;
   return cumulet::demo::medium_of_fire(volume_of(viewer).get(), scene.medium);
 }
 
@@ -333,9 +333,10 @@ class Studio {
       progress_.stage("loading " + scene.volume);
       cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
       file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
+      file.log = cumulet::demo::Messages::print, file.log_user = &messages_;
       if (next) {
         load_both(scene, file, *next);
-      } else {
+      } else if (!cumulet::demo::show_fire(viewer_, scene, file)) {
         check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
       }
     }
