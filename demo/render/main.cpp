@@ -324,6 +324,7 @@ class Studio {
 
   [[nodiscard]] Progress& progress() { return progress_; }
   [[nodiscard]] const Viewer& viewer() const { return viewer_; }
+  [[nodiscard]] double seconds() const { return seconds_since(start_); }
 
   /// Loads the scene's volume and everything else, and waits for it. frame: the frame of a sequence, or null. Throws
   /// the cause of a failure.
@@ -379,9 +380,9 @@ class Studio {
     warm_up(viewer_, options, progress_);
     const auto start = Clock::now();
     const Traced traced = ::trace(viewer_, options, from, progress_, [&] {
-      if (!early.due(seconds_since(start_))) return;
+      if (!early.due(seconds())) return;
       write_early(options);
-      early.written(seconds_since(start_));
+      early.written(seconds());
     });
     traced_seconds_ = seconds_since(start);
     return traced;
@@ -621,7 +622,7 @@ void place_camera(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::turn_to_first_view(viewer.get());
 }
 
-void render(const RenderOptions& options) {
+void render(RenderOptions options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
@@ -632,6 +633,8 @@ void render(const RenderOptions& options) {
   studio.remark(options.scene);
   studio.choose_in_surfaces(options);
   place_camera(studio.viewer(), options);
+  if (options.whole_seconds)
+    options.time_limit = cumulet::demo::sampling_seconds(*options.whole_seconds, studio.seconds());
   const Traced traced = studio.trace(options, from, early_pictures(options));
   if (traced == Traced::stopped && !options.checkpoint.empty())
     throw std::runtime_error(options.output + ": interrupted: run the same command to resume from " +
