@@ -1,9 +1,18 @@
 #include "fire.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <memory>
 #include <presets.hpp>
 #include <scene_file.hpp>
 #include <settings.hpp>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 namespace cumulet::demo {
 
@@ -25,6 +34,38 @@ cumulet_volume_info info_of(const cumulet_volume* volume) {
   // Cannot fail: the volume exists and struct_size is set.
   static_cast<void>(cumulet_volume_get_info(volume, &info));
   return info;
+}
+
+// Names by which the library finds a temperature or a flame (docs/grids.md). A fire that is missed here costs only
+// time.
+constexpr std::array<std::string_view, 8> fire_names = {"temperature", "heat", "temp", "flame",
+                                                        "flames",      "fire", "burn", "fuel"};
+
+bool names_fire(const cumulet_volume_file_desc& file) {
+  const auto named = [](const char* grid) {
+    return grid != nullptr && *grid != '\0' && std::string_view(grid) != "none";
+  };
+  if (named(file.temperature_grid) || named(file.flame_grid)) return true;
+  bool found = false;
+  const auto look = [](void* user, const char* name, const char*, const char*) {
+    std::string lower = name;
+    std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (std::ranges::find(fire_names, lower) != fire_names.end()) *static_cast<bool*>(user) = true;
+  };
+  return cumulet_list_grids(file.path, look, &found, nullptr, 0) == CUMULET_OK && found;
+}
+
+// Keeps notes until it is known who reports them.
+using Notes = std::vector<std::pair<cumulet_log_level, std::string>>;
+
+std::shared_ptr<cumulet_volume> open_quietly(cumulet_volume_file_desc file, Notes& notes) {
+  file.log = [](void* user, cumulet_log_level level, const char* text) {
+    static_cast<Notes*>(user)->emplace_back(level, text);
+  };
+  file.log_user = &notes;
+  cumulet_volume* opened = nullptr;
+  static_cast<void>(cumulet_volume_open_file(&file, &opened, nullptr, 0));
+  return {opened, cumulet_volume_release};
 }
 
 double size_of(const cumulet_volume_info& info) {
@@ -64,6 +105,24 @@ std::optional<cumulet_medium_desc> medium_of_fire(const cumulet_volume* volume, 
     medium.density_scale = 0.0;  // a flame without smoke
   apply(burning, medium);
   return medium;
+}
+
+bool show_fire(cumulet_viewer* viewer, const cumulet_volume_file_desc& file, const cumulet_medium_desc& plain) {
+  if (!names_fire(file)) return false;
+  Notes notes;
+  const std::shared_ptr<cumulet_volume> volume = open_quietly(file, notes);
+  if (!volume || info_of(volume.get()).active_voxels == 0) return false;
+  cumulet_medium_desc medium = plain;
+  if (const auto burning = medium_of_fire(volume.get(), plain)) {
+    medium = *burning;
+  } else {
+    static_cast<void>(cumulet_volume_suggest_density_scale(volume.get(), &medium.density_scale));  // if visible
+  }
+  for (const auto& [level, text] : notes)
+    if (file.log != nullptr) file.log(file.log_user, level, text.c_str());
+  if (cumulet_set_medium(viewer, &medium) != CUMULET_OK || cumulet_set_volume(viewer, volume.get()) != CUMULET_OK)
+    throw std::runtime_error(cumulet_last_error(viewer));
+  return true;
 }
 
 }  // namespace cumulet::demo

@@ -19,4 +19,11 @@ namespace cumulet::demo {
 [[nodiscard]] std::optional<cumulet_medium_desc> medium_of_fire(const cumulet_volume* volume,
                                                                 const cumulet_medium_desc& plain);
 
+/// Reads a file of which a grid has the name of a temperature or a flame, and shows it in the viewer with the medium of
+/// medium_of_fire, or with `plain` and the suggested density scale if it does not burn. The medium is set before the
+/// grid is built for it, so the grid is built once. file.log receives notes. Returns false and changes nothing if no
+/// grid has such a name, and if the volume cannot be read or is empty, which loading through the viewer reports.
+[[nodiscard]] bool show_fire(cumulet_viewer* viewer, const cumulet_volume_file_desc& file,
+                             const cumulet_medium_desc& plain);
+
 }  // namespace cumulet::demo

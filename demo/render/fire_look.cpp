@@ -27,7 +27,7 @@ bool is_whole(const SceneOptions& scene) {
 }  // namespace
 
 std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
-  if (!scene.is_shown() || !scene.auto_density_scale || !is_unsaid(scene.medium)) return std::nullopt;
+  if (!sets_no_medium(scene)) return std::nullopt;
   return medium_of_fire(volume_of(viewer).get(), scene.medium);
 }
 

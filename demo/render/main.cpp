@@ -311,6 +311,7 @@ class Studio {
   [[nodiscard]] Progress& progress() { return progress_; }
   [[nodiscard]] const Viewer& viewer() const { return viewer_; }
   [[nodiscard]] FireLook& fire_look() { return fire_look_; }
+  [[nodiscard]] double seconds() const { return seconds_since(start_); }
 
   /// Loads the scene's volume and everything else, and waits for it. frame: the frame of a sequence, or null. Throws
   /// the cause of a failure.
@@ -320,9 +321,10 @@ class Studio {
       progress_.stage("loading " + scene.volume);
       cumulet_volume_file_desc file = cumulet::demo::volume_file(scene);
       file.suggested_density_scale = scene.auto_density_scale ? 1 : 0;
+      file.log = cumulet::demo::Messages::print, file.log_user = &messages_;
       if (next) {
         load_both(scene, file, *next);
-      } else {
+      } else if (!cumulet::demo::show_fire(viewer_, scene, file)) {
         check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
       }
     }
@@ -369,9 +371,9 @@ class Studio {
     warm_up(viewer_, options, progress_);
     const auto start = Clock::now();
     const Traced traced = ::trace(viewer_, options, from, progress_, [&] {
-      if (!early.due(seconds_since(start_))) return;
+      if (!early.due(seconds())) return;
       write_early(options);
-      early.written(seconds_since(start_));
+      early.written(seconds());
     });
     traced_seconds_ = seconds_since(start);
     return traced;
@@ -620,7 +622,7 @@ void place_camera(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::turn_to_first_view(viewer.get());
 }
 
-void render(const RenderOptions& options) {
+void render(RenderOptions options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
@@ -631,6 +633,8 @@ void render(const RenderOptions& options) {
   studio.remark(options.scene);
   studio.choose_in_surfaces(options);
   place_camera(studio.viewer(), options);
+  if (options.whole_seconds)
+    options.time_limit = cumulet::demo::sampling_seconds(*options.whole_seconds, studio.seconds());
   const Traced traced = studio.trace(options, from, early_pictures(options));
   if (traced == Traced::stopped && !options.checkpoint.empty())
     throw std::runtime_error(options.output + ": interrupted: run the same command to resume from " +

@@ -650,12 +650,13 @@ void make_thumbnail(const CLI::App& app, RenderOptions& options) {
   }
   constexpr std::uint32_t samples = 16;
   constexpr double seconds = 1.5;
+  constexpr double whole_seconds = 2.6;
   constexpr std::uint64_t max_cells = 200'000;
   SceneOptions& scene = options.scene;
   scene.width = scene.height = *options.thumbnail;
   options.format = OutputFormat::png;
   if (!given("--spp")) scene.sampling.samples = samples;
-  if (!given("--time-limit")) options.time_limit = seconds;
+  if (!given("--time-limit")) options.time_limit = seconds, options.whole_seconds = whole_seconds;
   if (!given("--denoise")) options.denoise = Denoise::fast;
   if (!given("--max-cells")) scene.grid.max_cells = max_cells;
   if (!given("--shader-cache")) options.shader_cache = thumbnail_shader_cache();

@@ -62,6 +62,7 @@ struct RenderOptions {
   std::string checkpoint;                  // empty: none
   double checkpoint_every = 300.0;         // seconds
   std::optional<double> time_limit;        // seconds from the first sample
+  std::optional<double> whole_seconds;     // of a thumbnail, from the start; replaces time_limit
   std::uint64_t gpu_memory = 0;            // bytes; 0: no limit
   Denoise denoise = Denoise::off;          // for .exr, the denoised image is an additional layer
   bool denoises_by_default = false;        // --denoise is not given

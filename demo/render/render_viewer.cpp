@@ -6,6 +6,7 @@
 #include <shader_cache.hpp>
 #include <stdexcept>
 
+#include "fire.hpp"
 #include "transforms.hpp"
 
 namespace cumulet::demo {
@@ -83,6 +84,14 @@ void print_density_scale(const Viewer& viewer, bool ramped, Progress& progress) 
   std::snprintf(digits.data(), digits.size(), "%g", scale);
   print_line(progress, std::string("density scale ") + digits.data() + " for a mean optical depth of 8" +
                            (ramped ? " before the ramp" : "") + " (--density-scale)");
+}
+
+bool sets_no_medium(const SceneOptions& scene) {
+  return scene.is_shown() && scene.auto_density_scale && is_unsaid(scene.medium);
+}
+
+bool show_fire(const Viewer& viewer, const SceneOptions& scene, const cumulet_volume_file_desc& file) {
+  return sets_no_medium(scene) && show_fire(viewer.get(), file, scene.medium);
 }
 
 }  // namespace cumulet::demo

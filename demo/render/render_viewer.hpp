@@ -40,4 +40,11 @@ void print_line(Progress& progress, const std::string& line);
 /// Logs the suggested density scale, which does not depend on the camera. The volume was loaded with it.
 void print_density_scale(const Viewer& viewer, bool ramped, Progress& progress);
 
+/// Returns true if the medium may be chosen for the scene's volume, because no setting of it is given.
+[[nodiscard]] bool sets_no_medium(const SceneOptions& scene);
+
+/// Reads and shows a file that may burn, if the scene sets no medium. Returns false if it is to be loaded as others
+/// are.
+[[nodiscard]] bool show_fire(const Viewer& viewer, const SceneOptions& scene, const cumulet_volume_file_desc& file);
+
 }  // namespace cumulet::demo

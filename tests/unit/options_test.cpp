@@ -1,4 +1,5 @@
 #include "options.hpp"
+#include "time_limit.hpp"
 
 #include <gtest/gtest.h>
 
@@ -269,6 +270,9 @@ TEST(Options, AThumbnailHasItsOwnDefaults) {
   EXPECT_EQ(options.scene.sampling.samples, 16U);
   ASSERT_TRUE(options.time_limit);
   EXPECT_LT(*options.time_limit, 3.0);
+  ASSERT_TRUE(options.whole_seconds);
+  EXPECT_LT(*options.whole_seconds, 3.0);
+  EXPECT_FALSE(parse({"--thumbnail", "128", "--time-limit", "9"}).whole_seconds);
   EXPECT_NE(options.scene.grid.max_cells, 0U);
   const RenderOptions mine = parse({"--thumbnail", "64", "--spp", "3", "--denoise", "off", "--shader-cache", "here"});
   EXPECT_EQ(mine.scene.sampling.samples, 3U);
@@ -278,6 +282,15 @@ TEST(Options, AThumbnailHasItsOwnDefaults) {
   EXPECT_NE(usage_error(with({"--thumbnail", "8"})), "");
   EXPECT_EQ(usage_error(with({"-o", "/tmp/.thumbnail.X7a"})),
             "--output: '/tmp/.thumbnail.X7a' does not end in .png, .exr or .pfm");
+}
+
+// The denoiser takes two feature rays per sample, about 0.7 of the time of the samples.
+TEST(Options, ThumbnailsTakeTheTimeThatLoadingLeaves) {
+  using cumulet::demo::sampling_seconds;
+  EXPECT_NEAR(1.0 + 1.7 * sampling_seconds(2.6, 1.0), 2.6, 1e-9);
+  EXPECT_LT(sampling_seconds(2.6, 1.0), sampling_seconds(2.6, 0.5));
+  EXPECT_DOUBLE_EQ(sampling_seconds(2.6, 0.0), 1.5);   // enough for a picture of this size
+  EXPECT_DOUBLE_EQ(sampling_seconds(2.6, 30.0), 0.6);  // a large file is not shown as noise
 }
 
 TEST(Options, ALutIsForPngs) {

@@ -390,7 +390,8 @@ static void on_activate(GtkApplication* application, gpointer user) {
 int main(int argc, char** argv) {
   Host host = {0};
   const GOptionEntry entries[] = {
-      {"volume", 0, 0, G_OPTION_ARG_FILENAME, &host.volume, "Volume to show (.vdb, .nvdb)", "FILE"},
+      {"volume", 0, 0, G_OPTION_ARG_FILENAME, &host.volume,
+       "Volume to show (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif, .tiff), or a folder of .tif slices", "FILE"},
       {"test", 0, 0, G_OPTION_ARG_FILENAME, &host.test_folder, "Run the self-test and write screenshots", "OUT_DIR"},
       {0}};
   GtkApplication* application = gtk_application_new(NULL, G_APPLICATION_NON_UNIQUE);

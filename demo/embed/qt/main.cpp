@@ -249,7 +249,8 @@ class Window final : public QMainWindow {
 
     QMenu* file = menuBar()->addMenu("&File");
     QAction* open_action = file->addAction("&Open...", this, [this] {
-      const QString path = QFileDialog::getOpenFileName(this, "Open a volume", {}, "Volumes (*.vdb *.nvdb)");
+      const QString path = QFileDialog::getOpenFileName(
+          this, "Open a volume", {}, "Volumes (*.vdb *.nvdb *.nrrd *.nhdr *.vti *.raw *.tif *.tiff)");
       if (!path.isEmpty()) open(path);
     });
     open_action->setShortcut(QKeySequence::Open);
@@ -598,7 +599,9 @@ int run(int argc, char** argv) {
   QCommandLineParser parser;
   parser.setApplicationDescription("A Qt 6 window with two Cumulet viewers");
   parser.addHelpOption();
-  parser.addOption({"volume", "Volume to show (.vdb, .nvdb).", "FILE"});
+  parser.addOption({"volume",
+                    "Volume to show (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif, .tiff), or a folder of .tif slices.",
+                    "FILE"});
   parser.addOption({"test", "Run the self-test and write screenshots of the window.", "OUT_DIR"});
   parser.process(application);
 

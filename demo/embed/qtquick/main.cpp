@@ -132,7 +132,9 @@ int run(int argc, char** argv) {
   QCommandLineParser parser;
   parser.setApplicationDescription("A Qt Quick window with a Cumulet viewer");
   parser.addHelpOption();
-  parser.addOption({"volume", "Volume to show (.vdb, .nvdb).", "FILE"});
+  parser.addOption({"volume",
+                    "Volume to show (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif, .tiff), or a folder of .tif slices.",
+                    "FILE"});
   parser.addOption({"test", "Run the self-test and write screenshots of the window.", "OUT_DIR"});
   parser.process(application);
 
