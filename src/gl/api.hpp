@@ -47,6 +47,8 @@ struct Functions : GladGLContext {
   void ActiveTexture(GLenum unit) const;
   void BindTexture(GLenum target, GLuint texture) const;
   void BindTextureUnit(GLuint unit, GLuint texture) const;
+  /// Binds a texture with this target. It may have been created through another table of the share group.
+  void BindTextureUnit(GLuint unit, GLuint texture, GLenum target) const;
   void BindSampler(GLuint unit, GLuint sampler) const;
   void BindBuffer(GLenum target, GLuint buffer) const;
   void BindBufferBase(GLenum target, GLuint index, GLuint buffer) const;

@@ -588,6 +588,11 @@ void Functions::BindTextureUnit(GLuint unit, GLuint texture) const {
   GladGLContext::BindTextureUnit(unit, texture);
 }
 
+void Functions::BindTextureUnit(GLuint unit, GLuint texture, GLenum target) const {
+  if (guard != nullptr) guard->texture(unit, index_of(target));
+  GladGLContext::BindTextureUnit(unit, texture);
+}
+
 void Functions::BindSampler(GLuint unit, GLuint sampler) const {
   if (guard != nullptr) guard->sampler(unit);
   GladGLContext::BindSampler(unit, sampler);

@@ -16,6 +16,7 @@ constexpr std::size_t whole(std::size_t bytes) {
 }  // namespace
 
 void WordHeap::Pages::drop_empty(bool all_of_them) {
+  if (kept) return;
   std::size_t used = 0;
   for (const auto& page : all) used += page->units.size() - page->units.free();
   std::size_t most = all_of_them || used == 0 ? 0 : std::max(usual_units, 2 * used);

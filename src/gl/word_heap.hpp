@@ -14,7 +14,7 @@ namespace cumulet::gl {
 /// Suballocates GPU buffers (pages): each user has a span of a page, which shaders address by an offset, so that users
 /// need no bindings of their own. Shaders read pages as texture buffers of RGBA32UI: storage buffers are 15 % slower on
 /// Mesa's llvmpipe where surfaces are traced. All calls, and the destruction of spans and of the heap, need the context
-/// current.
+/// current. Copies of a heap have the same pages.
 class WordHeap {
  public:
   struct Sizes {
@@ -36,6 +36,7 @@ class WordHeap {
   struct Pages {
     std::vector<std::unique_ptr<Page>> all;
     std::size_t usual_units = 0;  // of a page
+    bool kept = false;            // without a context no page can be freed
     // Frees pages without a span. Unless all_of_them is set, one page is kept for spans that are recreated often, if it
     // is not large compared with the used space.
     void drop_empty(bool all_of_them);
@@ -59,6 +60,8 @@ class WordHeap {
     explicit operator bool() const { return page_ != nullptr; }
     /// The page's texture buffer for shaders.
     [[nodiscard]] GLuint texture() const { return page_->texture.name(); }
+    /// Binds it. gl: may be another table than the heap's.
+    void bind(const Functions& gl, GLuint unit) const { gl.BindTextureUnit(unit, texture(), GL_TEXTURE_BUFFER); }
     /// The page's buffer, to be filled with glNamedBufferSubData.
     [[nodiscard]] GLuint buffer() const { return page_->buffer.name(); }
     /// Byte offset of the span in the buffer.
@@ -91,6 +94,15 @@ class WordHeap {
   /// Like take(), but at the beginning of a new page.
   Span take_page(std::size_t wanted, const char* what);
 
+  /// keep: spans that are returned free no pages, so that they can be destroyed without a context. Pages without a span
+  /// are freed by the call with false, which needs one.
+  void keep_pages(bool keep) {
+    pages_->kept = keep;
+    pages_->drop_empty(true);
+  }
+
+  /// The functions that own its buffers.
+  [[nodiscard]] const FunctionsPtr& functions() const { return gl_; }
   [[nodiscard]] std::size_t pages() const { return pages_->all.size(); }
   /// Total size of all pages.
   [[nodiscard]] std::uint64_t bytes() const;

@@ -13,6 +13,11 @@ AttachedContext::AttachedContext(Log log, bool restore_state, std::shared_ptr<Sh
       restore_state_(restore_state),
       sharing_(sharing ? std::move(sharing) : std::make_shared<Sharing>()) {}
 
+AttachedContext::~AttachedContext() {
+  lose_unless_current();
+  if (context_) end();
+}
+
 Context& AttachedContext::get() const {
   if (!context_) throw Error(ErrorCode::detached, "the viewer is not attached to a GL context");
   return *context_;
@@ -35,19 +40,26 @@ void AttachedContext::detach() {
     return;
   }
   context_->group().require();
-  context_.reset();
+  end();
   gl::clear_errors(*functions);
+}
+
+void AttachedContext::end() {
+  const gl::Programs::Turn turn(context_->programs(), log_);
+  context_.reset();
 }
 
 void AttachedContext::lose() {
   if (!context_) return;
-  context_->functions()->abandoned = true;
+  const gl::Programs::Turn turn(context_->programs(), log_);
   const Commons commons = context_->commons();
+  context_->functions()->abandoned = true;
   context_.reset();
   // Another viewer may be attached to another context of the share group.
   if (commons.memories.use_count() > 1) return;
   commons.programs->abandon();
   commons.memories->abandon();
+  commons.marches->abandon();
 }
 
 void AttachedContext::lose_unless_current() {

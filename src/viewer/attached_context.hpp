@@ -16,6 +16,10 @@ class AttachedContext {
   /// restore_state: call() restores the GL state that it found. sharing: resources of viewers that share shader
   /// programs; null: its own.
   AttachedContext(Log log, bool restore_state, std::shared_ptr<Sharing> sharing);
+  AttachedContext(const AttachedContext&) = delete;
+  AttachedContext& operator=(const AttachedContext&) = delete;
+  /// Deletes its objects if the context is current.
+  ~AttachedContext();
 
   /// [GL] Throws Error(invalid_argument) if there is one already.
   void attach(GetProc get_proc, void* user);
@@ -35,6 +39,9 @@ class AttachedContext {
   [[nodiscard]] Context& get() const;
 
  private:
+  // Deletes the objects, after the running calls of viewers that share some of them.
+  void end();
+
   Log log_;
   bool restore_state_;
   std::shared_ptr<Sharing> sharing_;

@@ -782,6 +782,7 @@ cumulet_status cumulet_get_stats(cumulet_viewer* viewer, cumulet_stats* stats) {
     s.steps = had.steps;
     s.noise = had.noise.value_or(unknown_noise);
     s.nonfinite_samples = had.samples_not_finite;
+    s.cell_viewers = had.cell_viewers;
     const core::StateLock::Held held = v.hold_state();
     if (const auto volume_info = v.volume_info()) {
       const core::Bounds bounds = v.bounds_of(*volume_info);

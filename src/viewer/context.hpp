@@ -84,7 +84,7 @@ class Context {
   [[nodiscard]] const gl::FunctionsPtr& functions() const { return functions_; }
   [[nodiscard]] const gl::ShareGroup& group() const { return group_; }
   [[nodiscard]] const gl::ProgramsPtr& programs() const { return programs_; }
-  [[nodiscard]] Commons commons() const { return {programs_, memories_}; }
+  [[nodiscard]] Commons commons() const { return {programs_, memories_, marches_}; }
   [[nodiscard]] const GlStrings& strings() const { return strings_; }
   [[nodiscard]] const render::GpuScene& scene() const { return scene_; }
   [[nodiscard]] render::Progressive& progressive() { return progressive_; }
@@ -258,6 +258,7 @@ class Context {
   gl::Limits limits_;
   GlStrings strings_;
   render::DeviceMemoriesPtr memories_;
+  render::SharedMarchesPtr marches_;
   render::GpuScene scene_;
   render::Progressive progressive_;
   render::Compositor compositor_;

@@ -7,6 +7,7 @@
 
 #include "gl/programs.hpp"
 #include "render/dynamic/device_memories.hpp"
+#include "render/scene/shared_marches.hpp"
 
 namespace cumulet::viewer {
 
@@ -14,6 +15,7 @@ namespace cumulet::viewer {
 struct Commons {
   gl::ProgramsPtr programs;
   render::DeviceMemoriesPtr memories;
+  render::SharedMarchesPtr marches;
 };
 
 /// Resources of viewers that share shader programs, per share group to which one of them is attached. Thread-safe.
@@ -29,6 +31,7 @@ class Sharing {
   struct Group {
     std::weak_ptr<gl::Programs> programs;
     std::weak_ptr<render::DeviceMemories> memories;
+    std::weak_ptr<render::SharedMarches> marches;
   };
   std::mutex mutex_;
   gl::ProgramPool programs_;

@@ -41,6 +41,7 @@ struct Stats {
   render::PassSeconds pass_seconds;
   std::uint64_t samples = 0;
   std::uint64_t samples_not_finite = 0;
+  std::uint64_t cell_viewers = 0;
   std::uint64_t steps = 0;
   std::optional<double> noise;  // nullopt: unknown
   GlStrings strings;

@@ -471,6 +471,7 @@ Stats Viewer::stats() {
   s.noise = totals_.noise;
   if (g != nullptr) {
     s.cell_bytes = g->scene().data_bytes();
+    s.cell_viewers = g->scene().data_viewers();
     s.gl_bytes = g->bytes();
     s.strings = g->strings();
     s.trace_seconds = g->progressive().trace_seconds();

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -17,13 +21,25 @@ using cumulet::test::HostTarget;
 using cumulet::test::make_ball;
 using cumulet::test::make_viewer;
 using cumulet::test::picture_of;
+using cumulet::test::ProgramsRef;
 using cumulet::test::ViewerPtr;
 using cumulet::test::VolumeRef;
 using Picture = std::vector<std::uint8_t>;
 
 constexpr int side = 48;
 
-ViewerPtr viewer_here() { return make_viewer({.get_proc = EglContext::get_proc}); }
+ViewerPtr viewer_here(cumulet_shader_cache* programs = nullptr) {
+  return make_viewer({.get_proc = EglContext::get_proc, .programs = programs});
+}
+ProgramsRef make_programs() {
+  return cumulet::test::made_by<ProgramsRef>(cumulet_shader_cache_create,
+                                             cumulet::test::make_desc<cumulet_shader_cache_desc>());
+}
+std::uint64_t cell_viewers(const ViewerPtr& viewer) {
+  auto stats = cumulet::test::make_desc<cumulet_stats>();
+  EXPECT_EQ(cumulet_get_stats(viewer.get(), &stats), CUMULET_OK);
+  return stats.cell_viewers;
+}
 GladGLContext gl_here() { return cumulet::test::load_gl(EglContext::get_proc, nullptr); }
 
 /// Creates, uses and destroys a viewer on this thread, in a context of its own.
@@ -142,6 +158,96 @@ TEST_F(MultipleViewers, AttachedInOneContextRenderedInAnotherThatShares) {
     EXPECT_EQ(target.pixels(), lone_other_);
     EXPECT_EQ(gl.GetError(), GLenum{GL_NO_ERROR});
   }
+}
+
+// With one shader cache, viewers in contexts that share objects have one copy of a grid in GL memory.
+TEST_F(MultipleViewers, ContextsThatShareHaveOneCopyOfAGrid) {
+  const ProgramsRef programs = make_programs();
+  for (const bool lost : {false, true}) {
+    SCOPED_TRACE(lost);
+    const EglContext a;
+    const EglContext b(&a);
+    const EglContext apart;
+    const auto draw = [&](const EglContext& context, const ViewerPtr& viewer) {
+      context.make_current();
+      const GladGLContext gl = gl_here();
+      const HostTarget target(gl, side, side);
+      Picture drawn = picture_of(viewer.get(), volume_.get(), target);
+      EXPECT_EQ(gl.GetError(), GLenum{GL_NO_ERROR});
+      return drawn;
+    };
+    const auto viewer_in = [&](const EglContext& context) {
+      context.make_current();
+      return viewer_here(programs.get());
+    };
+    ViewerPtr first = viewer_in(a);
+    ViewerPtr second = viewer_in(b);
+    ViewerPtr third = viewer_in(apart);
+    EXPECT_EQ(draw(a, first), lone_);
+    EXPECT_EQ(draw(b, second), lone_);
+    EXPECT_EQ(draw(apart, third), lone_);
+    EXPECT_EQ(cell_viewers(first), 2U);
+    EXPECT_EQ(cell_viewers(second), 2U);
+    EXPECT_EQ(cell_viewers(third), 1U);
+    // The grid outlives the viewer that uploaded it.
+    if (lost) {
+      ASSERT_EQ(cumulet_context_lost(first.get()), CUMULET_OK);
+    } else {
+      a.make_current();
+    }
+    first.reset();
+    EXPECT_EQ(cell_viewers(second), 1U);
+    b.make_current();
+    ASSERT_EQ(cumulet_set_volume(second.get(), other_.get()), CUMULET_OK);
+    const ViewerPtr fourth = viewer_in(b);
+    EXPECT_EQ(draw(b, second), lone_);
+    EXPECT_EQ(draw(b, fourth), lone_);
+    EXPECT_EQ(cell_viewers(second), 2U);
+    second.reset();
+    EXPECT_EQ(draw(b, fourth), lone_);
+    EXPECT_EQ(draw(apart, third), lone_);
+    apart.make_current();
+    third.reset();
+    b.make_current();
+  }
+}
+
+// Viewers on several threads, each in its own context of the share group, take grids from each other and end at any
+// time.
+TEST_F(MultipleViewers, ThreadsOfOneShareGroupShareGrids) {
+  const ProgramsRef programs = make_programs();
+  const EglContext base;
+  constexpr std::size_t threads = 3;
+  std::vector<std::unique_ptr<EglContext>> contexts;
+  for (std::size_t i = 0; i < threads; ++i) contexts.push_back(std::make_unique<EglContext>(&base));
+  std::atomic<int> shared = 0;
+  const auto work = [&](std::size_t index) {
+    contexts[index]->make_current();
+    {
+      const GladGLContext gl = gl_here();
+      const HostTarget target(gl, side, side);
+      ViewerPtr viewer = viewer_here(programs.get());
+      for (std::size_t round = 0; round < 12; ++round) {
+        const bool plain = (round + index) % 3 != 0;
+        const Picture drawn = picture_of(viewer.get(), plain ? volume_.get() : other_.get(), target);
+        EXPECT_EQ(drawn, plain ? lone_ : lone_other_) << index << ' ' << round;
+        if (cell_viewers(viewer) > 1) ++shared;
+        if (round % 4 == 3) {
+          if (round % 8 == 3) {
+            EXPECT_EQ(cumulet_context_lost(viewer.get()), CUMULET_OK);
+          }
+          viewer.reset();
+          viewer = viewer_here(programs.get());
+        }
+      }
+      EXPECT_EQ(gl.GetError(), GLenum{GL_NO_ERROR});
+    }
+    contexts[index]->release();
+  };
+  std::vector<std::thread> running;
+  for (std::size_t i = 0; i < threads; ++i) running.emplace_back(work, i);
+  for (std::thread& thread : running) thread.join();
+  EXPECT_GT(shared, 0);
 }
 
 TEST_F(MultipleViewers, OneCameraControlsTwoViewers) {

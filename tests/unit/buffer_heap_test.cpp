@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "base/error.hpp"
@@ -169,6 +172,32 @@ TEST_P(BufferHeap, ExceededLimitsAreErrorsAndLeakNothing) {
   expect_full(first, 3000, 1);
   expect_full(second, 12000, 2);
   expect_full(third, 3000, 3);
+}
+
+// The owner of spans may lose its context while others use pages of the heap.
+TEST(BufferHeapMemory, KeptPagesNeedNoContext) {
+  auto context = headless::Context::create(headless::Backend::egl);
+  test::FakeGl fake(headless::Context::get_proc, &context);
+  const gl::FunctionsPtr gl = gl::load_functions(test::FakeGl::get_proc, &fake);
+  {
+    std::optional<WordHeap> heap(std::in_place, gl, WordHeap::Sizes{.page_bytes = 1U << 12U});
+    WordHeap::Span shared = heap->take(100, "creating");
+    WordHeap::Span alone = heap->take(100000, "creating");
+    EXPECT_EQ(heap->pages(), 2U);
+    const std::uint64_t calls = fake.calls();
+    WordHeap left = *heap;
+    left.keep_pages(true);
+    alone = {};
+    heap.reset();
+    EXPECT_EQ(fake.calls(), calls);
+    left.keep_pages(false);
+    EXPECT_EQ(left.pages(), 1U);
+    EXPECT_EQ(left.bytes(), 1U << 12U);
+    shared = {};
+    EXPECT_EQ(left.pages(), 0U);
+  }
+  EXPECT_TRUE(fake.alive().empty());
+  EXPECT_EQ(fake.wrong_deletes(), 0U);
 }
 
 TEST(BufferHeapMemory, OutOfMemoryLeaksNothing) {

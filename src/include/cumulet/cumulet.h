@@ -19,7 +19,7 @@
  *
  * The library creates no window and no context, and does not link OpenGL: GL functions come from the host's get_proc
  * callback. No result depends on global state. Viewers are independent of each other, in one context or several and on
- * one thread or several, unless they share shader programs (cumulet_shader_cache).
+ * one thread or several, unless they share shader programs and GL memory (cumulet_shader_cache).
  *
  * @section cumulet_life_cycle Life cycle
  *
@@ -44,7 +44,8 @@
  * - All other functions (settings, loads, input, queries) do not wait for frames. While another thread is in
  *   cumulet_render, they take effect at once, and the next frame shows it. The running frame shows the state that it
  *   found. There are three exceptions: cumulet_get_stats, cumulet_attach and cumulet_context_lost wait for running [GL]
- *   calls, and cumulet_wait waits for workers.
+ *   calls, and cumulet_wait waits for workers. cumulet_context_lost and cumulet_destroy also wait for running [GL]
+ *   calls of viewers that share GL memory (cumulet_shader_cache).
  * - Each call is complete in itself. Two threads that read, change and set the same settings need a lock of their own.
  * - Worker threads read files, build grids, pose surfaces and compute physical skies. cumulet_render uploads the
  *   results within its time budget, and shows the last complete image until then.
@@ -365,10 +366,18 @@ typedef struct cumulet_shader_cache_desc {
 
 /**
  * Creates a cache of shader programs that viewers share (cumulet_create_desc.shader_cache). Viewers that are attached
- * to one context, or to contexts that share objects, compile each program only once among them.
+ * to one context, or to contexts that share objects, compile each program only once among them, and have one copy of
+ * each grid in GL memory. The library finds out which contexts share objects.
  *
  * - The programs are deleted with the last viewer that is attached to them; the files in the folder stay.
- * - These viewers also share the GL memory of dynamic volumes.
+ * - Viewers share cells in GL memory if they show the same grids (@ref cumulet_volumes) in the same order. One viewer
+ *   uploads them, within its frames. Meanwhile the others show what they have. If that viewer renders no more frames,
+ *   another one uploads them. The copy is deleted with the last viewer that shows it, whichever viewer uploaded it.
+ *   cumulet_detach, cumulet_context_lost and cumulet_destroy of one viewer do not affect the others.
+ * - A shared copy counts in full for each viewer, in cumulet_limits_desc.gl_bytes and in cumulet_stats. So the grids
+ *   and images of a viewer do not depend on the others. cumulet_stats.cell_viewers is the number of viewers that share.
+ * - These viewers also share the voxels of dynamic volumes in GL memory (gpu_resident). Each viewer has its own grids
+ *   of those voxels, and of the frames of sequences.
  * - [GL] calls of viewers that share programs wait for each other if they come from several threads. Callbacks may be
  *   called meanwhile: take no lock in them that is held around a [GL] call.
  * - The functions that get_proc returned for one of these viewers must stay callable until none of them is attached.
@@ -409,7 +418,7 @@ typedef struct cumulet_create_desc {
   cumulet_gl_state_policy gl_state;
   cumulet_trace_fn trace; /**< Receives timeline intervals. NULL: none. */
   void* trace_user;
-  cumulet_shader_cache* shader_cache; /**< Shared programs, retained. NULL: the viewer's own, without a folder. */
+  cumulet_shader_cache* shader_cache; /**< Shared programs and GL memory, retained. NULL: its own, without a folder. */
 } cumulet_create_desc;
 
 /**
@@ -429,7 +438,7 @@ CUMULET_API cumulet_status cumulet_create(const cumulet_create_desc* desc, cumul
                                           size_t error_size);
 /**
  * [GL] if attached. Cancels the workers, waits for them and frees everything. Without the context current, the GL
- * objects remain until the context is destroyed.
+ * objects remain until the context is destroyed, except for those that other viewers share (cumulet_shader_cache).
  *
  * Workers check for cancellation every few milliseconds: a destroy takes some 20 ms on an idle machine. Work that
  * cannot be interrupted is not waited for: a running decoder of another library (an image, a compressed mesh, JSON), or
@@ -479,7 +488,7 @@ CUMULET_API cumulet_status cumulet_detach(cumulet_viewer* viewer);
  * Detaches a viewer without any GL call, because its context and all objects in it are gone. Does nothing if it is
  * detached already.
  *
- * Threads: any thread; waits for running [GL] calls. No GL.
+ * Threads: any thread; waits for running [GL] calls, also those of viewers that share GL memory. No GL.
  *
  * @param viewer The viewer.
  * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
@@ -500,7 +509,8 @@ CUMULET_API cumulet_status cumulet_context_lost(cumulet_viewer* viewer);
  * - Viewers that need the same grid of a volume share it: it is built once, and it is in main memory once. The grids
  *   are the same if the grid settings are equal, and also those settings of media and limits on which a grid depends. A
  *   camera-adaptive grid depends on the camera, too. While one viewer builds the grid, the others wait. cumulet_cancel
- *   for one viewer does not affect the others. In GL memory each viewer has its own copy.
+ *   for one viewer does not affect the others. In GL memory, viewers with one cumulet_shader_cache have one copy;
+ *   viewers without one have their own.
  * - The medium is zero outside the bounds of the active voxels.
  * - Negative and non-finite voxels of a density count as zero. So do voxels beyond 1e30 or -1e30 of every field,
  *   because fill values are as large.
@@ -2175,7 +2185,8 @@ typedef struct cumulet_limits_desc {
   /**
    * Maximum GL memory in bytes. Cells are coarsened to fit into two fifths of the memory that the other GL objects of
    * the last frame leave (cumulet_stats.limited); several grids get equal parts. If new cells do not fit beside the old
-   * ones, the old ones are deleted first, and additional grids are shown once the others have shrunk.
+   * ones, the old ones are deleted first, and additional grids are shown once the others have shrunk. Cells that other
+   * viewers share (cumulet_shader_cache_create) count in full.
    *
    * Voxel grid types cannot be coarsened: a volume that would exceed gl_bytes, together with the previous one, is not
    * uploaded. The previous one stays, and cumulet_render returns CUMULET_ERROR_OUT_OF_MEMORY once. Surfaces and images
@@ -4225,7 +4236,8 @@ typedef struct cumulet_stats {
   size_t struct_size;
   uint64_t cells;      /**< Cells of all displayed grids. */
   uint32_t levels;     /**< Deepest bisection level of any cell; 0 for the 24 cells of the control cube. */
-  uint64_t cell_bytes; /**< GL memory that rays traverse: cell data and point-location tree, or voxels. */
+  uint64_t cell_bytes; /**< GL memory that rays traverse: cell data and point-location tree, or voxels. Also if other
+                            viewers share it (cell_viewers). */
   uint64_t active_voxels;
   double build_seconds_total; /**< Also if another viewer built the grid. */
   double build_seconds_load;
@@ -4242,7 +4254,8 @@ typedef struct cumulet_stats {
   char gl_renderer[128];
   char gl_version[128];
   int32_t limited;   /**< 1: max_cells or a memory limit, not the threshold, ended the refinement. */
-  uint64_t gl_bytes; /**< All GL memory of the viewer. */
+  uint64_t gl_bytes; /**< All GL memory of the viewer, including cell_bytes that others share. The memory in use by all
+                          viewers is the sum of gl_bytes - cell_bytes + cell_bytes / cell_viewers. */
   /**
    * GPU time of passes since the viewer was attached, as far as it is known, because nothing waits for it. The
    * difference between two calls suits a graph. On a driver that runs dispatches within the call (Mesa's llvmpipe), it
@@ -4264,6 +4277,11 @@ typedef struct cumulet_stats {
    * normal.
    */
   uint64_t nonfinite_samples;
+  /**
+   * Number of viewers that have the cells of cell_bytes in GL memory together, this one included: 1 if they are its
+   * own, 0 if there are none. See cumulet_shader_cache_create.
+   */
+  uint64_t cell_viewers;
 } cumulet_stats;
 
 /**

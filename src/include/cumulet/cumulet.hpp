@@ -1280,7 +1280,7 @@ struct ShaderCacheDesc {
   }
 };
 
-/// A reference to shared programs; a copy adds a reference. Empty: the viewer has its own.
+/// A reference to shared programs and GL memory; a copy adds a reference. Empty: the viewer has its own.
 class ShaderCache {
  public:
   ShaderCache() noexcept = default;

@@ -28,10 +28,7 @@ bool GridBuilds::advance(const Sources& sources, const Sources& kept, std::uint6
       return !source->plan || built_.contains(source) || build(source, max_bytes, deadline);
     });
   } catch (...) {
-    upload_.reset();
-    under_way_.reset();
-    on_cpu_.reset();
-    clear_built();
+    stop();
     throw;
   }
 }
@@ -175,11 +172,15 @@ std::optional<BuiltGrid> CpuGridBuild::take() {
 
 void GridBuilds::clear_built() { built_.clear(); }
 
-void GridBuilds::clear() {
+void GridBuilds::stop() {
   clear_built();
   under_way_.reset();
   on_cpu_.reset();
   upload_.reset();
+}
+
+void GridBuilds::clear() {
+  stop();
   lattices_.clear();
 }
 

@@ -6,9 +6,7 @@
 
 namespace cumulet::render {
 
-void EnvironmentData::bind(const gl::Functions& gl) const {
-  gl.BindTextureUnit(core::CM_UNIT_ENVIRONMENT, words_.texture());
-}
+void EnvironmentData::bind(const gl::Functions& gl) const { words_.bind(gl, core::CM_UNIT_ENVIRONMENT); }
 
 EnvironmentUpload::EnvironmentUpload(gl::FunctionsPtr gl, gl::WordHeap& heap, light::EnvironmentPtr environment)
     : environment_(std::move(environment)), upload_(std::move(gl), "uploading the environment") {

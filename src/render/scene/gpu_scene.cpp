@@ -106,6 +106,8 @@ MarchUpload::Sources sources_of(const std::vector<scene::Volume>& volumes) {
 
 void GpuScene::update(const scene::Snapshot& snapshot, const Wanted& wanted, Deadline deadline) {
   const MarchUpload::Sources sources = sources_of(snapshot.volumes);
+  marches_->collect();
+  if (data_) marches_->use(*data_);
   if (sources.empty()) drop_data();
   update_environment(*snapshot.surroundings, wanted, deadline);
   update_models(snapshot, wanted, deadline);
@@ -120,7 +122,7 @@ void GpuScene::find_present(const scene::Snapshot& snapshot) {
   if (!data_) return;
   for (const scene::Volume& volume : snapshot.volumes) {
     scene::Volume& present = present_.emplace_back(volume);
-    if (data_->grid(*volume.source) != nullptr) continue;
+    if (data()->grid(*volume.source) != nullptr) continue;
     const auto was = std::ranges::find(data_of_, volume.id, &scene::Volume::id);
     if (was == data_of_.end()) {
       present_.pop_back();
@@ -160,13 +162,13 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
   std::vector<scene::Instance> instances;
   const double extent = this->extent();
   for (const scene::Volume& volume : present_) {
-    const core::CmGrid& grid = *data_->grid(*volume.source);
+    const core::CmGrid& grid = *data()->grid(*volume.source);
     instances.push_back({.source = volume.source,
                          .transform = volume.transform.to_world,
                          .grid = grid,
                          .medium = medium_of(*volume.medium, *volume.source, extent),
                          .ends = volume.transform.ends,
-                         .emissive = *data_->emissive(*volume.source)});
+                         .emissive = *data()->emissive(*volume.source)});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
   const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };
@@ -353,7 +355,7 @@ void GpuScene::update_environment(const light::Surroundings& surroundings, const
 
 light::Lit GpuScene::ball_of(const scene::Volume& volume) const {
   const glm::dmat4 to_world = volume.transform.to_world * volume.source->cube.to_world;
-  const core::CmGrid& grid = *data_->grid(*volume.source);
+  const core::CmGrid& grid = *data()->grid(*volume.source);
   return {glm::dvec3(to_world * glm::dvec4(0.5 * glm::dvec3(grid.box_min + grid.box_max), 1.0)),
           0.5 * glm::length(glm::dmat3(to_world) * glm::dvec3(grid.box_max - grid.box_min))};
 }
@@ -363,7 +365,7 @@ std::vector<glm::dvec3> GpuScene::corners() const {
   corners.reserve(8 * present_.size());
   for (const scene::Volume& volume : present_) {
     const glm::dmat4 to_world = volume.transform.to_world * volume.source->cube.to_world;
-    const core::CmGrid& grid = *data_->grid(*volume.source);
+    const core::CmGrid& grid = *data()->grid(*volume.source);
     for (const glm::dvec3& corner : corners_of(grid.box_min, grid.box_max))
       corners.emplace_back(to_world * glm::dvec4(corner, 1.0));
   }
@@ -430,11 +432,28 @@ void GpuScene::update_analytic_lights(const scene::Snapshot& snapshot, const Wan
   make(analytic_lights_, model_instances_.get());
 }
 
-void GpuScene::drop_data() {
-  if (data_) data_revision_.advance();
+GpuScene::~GpuScene() {
+  if (gl_->abandoned) {
+    std::optional<MarchData> unfinished;
+    if (upload_ && upload_->work) unfinished = upload_->work->take();
+    marches_->leave(heap_, std::move(unfinished));
+    return;
+  }
+  upload_.reset();
+  clear_data();
+}
+
+void GpuScene::clear_data() {
+  if (data_) marches_->release(*data_);
   data_.clear();
   data_of_.clear();
+  marches_->collect();
+}
+
+void GpuScene::drop_data() {
+  if (data_) data_revision_.advance();
   upload_.reset();
+  clear_data();
   grids_.clear();
   took_ = {};  // frees main memory, too
 }
@@ -446,49 +465,28 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
   while (upload_ || data_.wants(sources, wanted.settings)) {
     const auto begun = Clock::now();
     if (!upload_) {
-      upload_ = VolumeUnderWay{sources, snapshot.volumes, snapshot.origin, wanted.settings, nullptr};
+      upload_ = VolumeUnderWay{sources, snapshot.volumes, snapshot.origin, wanted.settings};
       took_ = {sources, 0.0};
     }
     const MarchUpload::Sources of = upload_->of;
     try {
-      if (!upload_->work) {
-        if (!build_grids(of, wanted.max_bytes, deadline)) break;
-        auto work =
-            std::make_unique<MarchUpload>(gl_, limits_, heap_, of, data_.get(), wanted.page_texels, &grids_.built());
-        const auto fits_beside = [&](std::uint64_t held) {
-          held -= std::min(heap_.free_bytes(), work->bytes());
-          return work->bytes() <= wanted.max_bytes - std::min(wanted.max_bytes, held);
-        };
-        // Lattices are only needed for later views, so they are freed first.
-        if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.max_bytes, deadline);
-        // If the new cells do not fit beside the old ones, the old ones are freed first. They are kept if they include
-        // some of the new grids, because those would have to be made again. Exception: if the memory in use exceeds the
-        // limit by itself, grids in main memory are uploaded again from there.
-        const std::uint64_t held = data_bytes() + other_bytes();
-        const auto is_kept = [&](const scene::MarchSourcePtr& source) {
-          return data_->grid(*source) != nullptr && (source->plan || held <= wanted.max_bytes);
-        };
-        if (data_ && of.front()->march == scene::March::tet && !fits_beside(held) && fits_beside(other_bytes()) &&
-            std::ranges::none_of(of, is_kept)) {
-          work.reset();
-          data_.clear();
-          data_of_.clear();
-          data_revision_.advance();
-          continue;
-        }
-        require_room(work->bytes(), wanted.max_bytes);
-        upload_->work = std::move(work);
+      if (MarchDataPtr shared = marches_->find(of, wanted.page_texels)) {
+        upload_->work.reset();
+        grids_.stop();
+        if (make_room(shared->bytes(), true, wanted, deadline)) put_data(std::move(shared), snapshot);
+        continue;
       }
+      if (!upload_->announcement) {
+        if (marches_->is_coming(of, wanted.page_texels, upload_->wait)) break;
+        upload_->announcement = marches_->begin(of, wanted.page_texels);
+      }
+      ++upload_->announcement->steps;
+      if (!upload_->work && !plan_upload(wanted, deadline)) break;
       const bool done = upload_->work->advance(deadline);
+      upload_->announcement->progress = upload_->work->progress();
       took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
       if (!done) break;
-      data_.put(of, upload_->work->take());
-      grids_.clear_built();
-      data_of_ = std::move(upload_->volumes);
-      data_origin_ = upload_->origin;
-      present_ = came_with_data(snapshot);  // in case the following steps fail
-      upload_.reset();
-      data_revision_.advance();
+      put_data(marches_->add(upload_->work->take()), snapshot);
     } catch (...) {
       data_.fail(of, upload_->settings);
       upload_.reset();
@@ -498,12 +496,60 @@ void GpuScene::update_data(const MarchUpload::Sources& sources, const scene::Sna
   }
 }
 
+void GpuScene::put_data(MarchDataPtr data, const scene::Snapshot& snapshot) {
+  if (data_) marches_->release(*data_);
+  data_.put(upload_->of, std::move(data));
+  grids_.clear_built();
+  data_of_ = std::move(upload_->volumes);
+  data_origin_ = upload_->origin;
+  present_ = came_with_data(snapshot);  // in case the following steps fail
+  upload_.reset();
+  data_revision_.advance();
+  marches_->collect();
+}
+
+bool GpuScene::plan_upload(const Wanted& wanted, Deadline deadline) {
+  while (build_grids(upload_->of, wanted.max_bytes, deadline)) {
+    auto work =
+        std::make_unique<MarchUpload>(gl_, limits_, heap_, upload_->of, data(), wanted.page_texels, &grids_.built());
+    if (!make_room(work->bytes(), false, wanted, deadline)) continue;
+    upload_->work = std::move(work);
+    return true;
+  }
+  return false;
+}
+
+bool GpuScene::make_room(std::uint64_t bytes, bool complete, const Wanted& wanted, Deadline deadline) {
+  const auto fits_beside = [&](std::uint64_t held) {
+    held -= std::min(heap_.free_bytes(), bytes);
+    return bytes <= wanted.max_bytes - std::min(wanted.max_bytes, held);
+  };
+  // Lattices are only needed for later views, so they are freed first.
+  if (!fits_beside(data_bytes() + other_bytes())) grids_.advance({}, {}, wanted.max_bytes, deadline);
+  // If the new cells do not fit beside the old ones, the old ones are freed first. They are kept if they include some
+  // of the new grids, because those would have to be made again. Exception: if the memory in use exceeds the limit by
+  // itself, grids in main memory are uploaded again from there.
+  const std::uint64_t held = data_bytes() + other_bytes();
+  const auto is_kept = [&](const scene::MarchSourcePtr& source) {
+    return data()->grid(*source) != nullptr && (source->plan || held <= wanted.max_bytes);
+  };
+  const MarchUpload::Sources& of = upload_->of;
+  if (data_ && of.front()->march == scene::March::tet && !fits_beside(held) && fits_beside(other_bytes()) &&
+      (complete || std::ranges::none_of(of, is_kept))) {
+    clear_data();
+    data_revision_.advance();
+    return false;
+  }
+  require_room(bytes, wanted.max_bytes);
+  return true;
+}
+
 bool GpuScene::build_grids(const MarchUpload::Sources& of, std::uint64_t max_bytes, Deadline deadline) {
   const auto begun = Clock::now();
   // Grids that are uploaded are copied.
   MarchUpload::Sources missing;
   std::ranges::copy_if(of, std::back_inserter(missing),
-                       [&](const scene::MarchSourcePtr& source) { return !data_ || data_->grid(*source) == nullptr; });
+                       [&](const scene::MarchSourcePtr& source) { return !data_ || data()->grid(*source) == nullptr; });
   const std::uint64_t others = data_bytes() + other_bytes() - grids_.bytes();
   const bool done = grids_.advance(missing, of, max_bytes - std::min(max_bytes, others), deadline);
   if (!done) took_.seconds += std::chrono::duration<double>(Clock::now() - begun).count();
@@ -522,6 +568,7 @@ void GpuScene::require_room(std::uint64_t bytes, std::uint64_t max_bytes) const 
 
 double GpuScene::progress() const {
   if (upload_ && upload_->work) return upload_->work->progress();
+  if (upload_ && !upload_->announcement) return upload_->wait.progress;
   if (upload_) return grids_.progress();
   if (model_upload_ && model_upload_->work) return model_upload_->work->progress();
   return environment_upload_ && environment_upload_->work ? environment_upload_->work->progress() : 1.0;
@@ -612,7 +659,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
   } else {
     const scene::Volume& volume = present_.front();
     const scene::MarchSource& source = *volume.source;
-    p.grid = *data_->grid(source);
+    p.grid = *data()->grid(source);
     // Where several volumes were refused, this one is drawn as if it were the only one.
     p.medium = medium_of(*volume.medium, source, 2.0 * ball_of(volume).radius);
     const glm::dmat4& transform = volume.transform.to_world;
@@ -622,7 +669,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
       return glm::vec3(to_cube * glm::dvec4(eye, 1.0));
     };
     const scene::InstanceEmissive emissive =
-        scene::emissive_of(*data_->emissive(source), source.cube.to_world, transform);
+        scene::emissive_of(*data()->emissive(source), source.cube.to_world, transform);
     p.emissive = emissive.looks;
     own.power = emissive.power;
     own.length = emissive.length;

@@ -15,6 +15,7 @@
 #include "render/scene/march_data.hpp"
 #include "render/scene/model_upload.hpp"
 #include "render/scene/parameters.hpp"
+#include "render/scene/shared_marches.hpp"
 #include "render/scene/trace_inputs.hpp"
 #include "scene/snapshot.hpp"
 
@@ -24,14 +25,20 @@ namespace cumulet::render {
 /// calls that change it need a current context and an active StateGuard.
 class GpuScene {
  public:
-  /// memories: bricks of GPU-resident volumes.
-  GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits, DeviceMemoriesPtr memories)
+  /// memories: bricks of GPU-resident volumes. marches: uploaded grids of the share group.
+  GpuScene(gl::FunctionsPtr gl, gl::ProgramsPtr programs, gl::Limits limits, DeviceMemoriesPtr memories,
+           SharedMarchesPtr marches)
       : gl_(std::move(gl)),
         programs_(std::move(programs)),
         limits_(limits),
-        heap_(gl_, {.largest_page = static_cast<std::size_t>(limits.texture_buffer_texels) * 16}),
+        marches_(std::move(marches)),
+        heap_(marches_->functions(), {.largest_page = static_cast<std::size_t>(limits.texture_buffer_texels) * 16}),
         grids_(gl_, programs_, limits, std::move(memories)),
         surface_pass_(gl_) {}
+  GpuScene(const GpuScene&) = delete;
+  GpuScene& operator=(const GpuScene&) = delete;
+  /// Without a current context of the share group `gl` must be abandoned.
+  ~GpuScene();
 
   struct Wanted {
     bool raster = true;            // with the data of the surface pass
@@ -48,7 +55,11 @@ class GpuScene {
   /// In the order that Picked::volume indexes.
   [[nodiscard]] const std::vector<scene::Volume>& volumes() const { return present_; }
   /// Null: there is no volume, so no picture can be made.
-  [[nodiscard]] const MarchData* data() const { return data_.get(); }
+  [[nodiscard]] const MarchData* data() const { return data_ ? data_->get() : nullptr; }
+  /// Number of viewers of the share group that hold data(), this one included.
+  [[nodiscard]] std::uint64_t data_viewers() const {
+    return data_ ? static_cast<std::uint64_t>(data_->use_count()) - 1 : 0;  // the group has one reference
+  }
   /// Revision number; changes when the volume data or the number of volumes changes.
   [[nodiscard]] Revision<MarchData> data_revision() const { return data_revision_; }
   /// Revision number; changes when one of several volumes moves.
@@ -66,13 +77,14 @@ class GpuScene {
   [[nodiscard]] double progress() const;
   /// Time that the last or current upload took, if it includes this source, in seconds.
   [[nodiscard]] std::optional<double> upload_seconds(const scene::MarchSourcePtr& of) const;
-  [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? data_->bytes() : 0; }
+  /// Including memory that other viewers use, too.
+  [[nodiscard]] std::uint64_t data_bytes() const { return data_ ? (*data_)->bytes() : 0; }
   /// The part of other_bytes() that can be freed when volumes arrive: grid builds in progress, and free space of the
   /// heap's pages.
   [[nodiscard]] std::uint64_t passing_bytes() const { return grids_.bytes() + heap_.free_bytes(); }
   /// Cell counts of a tetrahedral grid; null: it is not uploaded.
   [[nodiscard]] const MarchData::Cells* cells(const scene::MarchSourcePtr& of) const {
-    return data_ && of ? data_->cells(*of) : nullptr;
+    return data_ && of ? (*data_)->cells(*of) : nullptr;
   }
   /// GL memory of everything but the volumes: surfaces, their raster data, environment, instances, builds and free
   /// space.
@@ -109,6 +121,15 @@ class GpuScene {
   // Shows the rasterized models with the same transforms as the path-traced ones.
   void update_raster();
   void drop_data();
+  // Frees data_ if no other viewer has them.
+  void clear_data();
+  // Replaces data_ by those of the upload in progress, which ends it.
+  void put_data(MarchDataPtr data, const scene::Snapshot& snapshot);
+  // Plans the upload in progress once its grids are built. Returns false if that takes longer.
+  bool plan_upload(const Wanted& wanted, Deadline deadline);
+  // Frees lattices and the previous data if new data need their memory. complete: another viewer has uploaded them.
+  // Returns false if the previous data were freed. Throws Error(out_of_memory) if that does not suffice.
+  bool make_room(std::uint64_t bytes, bool complete, const Wanted& wanted, Deadline deadline);
   // Builds the grids that are built on the GPU and are not uploaded. Returns whether all are built.
   bool build_grids(const MarchUpload::Sources& of, std::uint64_t max_bytes, Deadline deadline);
   void require_room(std::uint64_t bytes, std::uint64_t max_bytes) const;
@@ -136,17 +157,20 @@ class GpuScene {
   gl::FunctionsPtr gl_;
   gl::ProgramsPtr programs_;
   gl::Limits limits_;
-  gl::WordHeap heap_;
-  GridBuilds grids_;  // of volumes that are being uploaded
+  SharedMarchesPtr marches_;
+  gl::WordHeap heap_;  // its pages may outlive the viewer, with grids that others use
+  GridBuilds grids_;   // of volumes that are being uploaded
   // An upload in progress, and the settings at its start.
   struct VolumeUnderWay {
     MarchUpload::Sources of;
     std::vector<scene::Volume> volumes;  // volumes at its start
     glm::dvec3 origin{0.0};              // of their coordinates
     std::uint64_t settings = 0;
-    std::unique_ptr<MarchUpload> work;
+    SharedMarches::Wait wait{};                   // for another viewer that uploads the same...
+    SharedMarches::InProgressPtr announcement{};  // ...or for which others wait
+    std::unique_ptr<MarchUpload> work{};
   };
-  Slot<MarchData, MarchUpload::Sources> data_;
+  Slot<MarchDataPtr, MarchUpload::Sources> data_;
   std::vector<scene::Volume> data_of_;  // volumes of the last upload
   glm::dvec3 data_origin_{0.0};         // of their coordinates
   Revision<MarchData> data_revision_;

@@ -157,6 +157,10 @@ class ChannelBytes {
 
 }  // namespace
 
+bool MarchData::is_of(const std::vector<scene::MarchSourcePtr>& sources, std::int64_t page_texels) const {
+  return page_texels_ == page_texels && std::ranges::equal(parts_, sources, {}, &Part::source);
+}
+
 const core::CmGrid* MarchData::grid(const scene::MarchSource& source) const {
   const Part* part = part_of(source);
   return part == nullptr ? nullptr : &part->grid;
@@ -191,12 +195,14 @@ Upload::Location MarchData::location_of(const Run& run) const {
 MarchUpload::MarchUpload(gl::FunctionsPtr gl, const gl::Limits& limits, gl::WordHeap& heap, const Sources& sources,
                          const MarchData* before, std::int64_t page_texels, const BuiltGrids* built)
     : gl_(std::move(gl)),
+      owner_(heap.functions()),
       limits_(limits),
       before_(before),
       built_(built),
       source_(sources.at(0)),
       upload_(gl_, "uploading the volume") {
   data_.march_ = source_->march;
+  data_.page_texels_ = page_texels;
   data_.linear_ = source_->linear;
   data_.trilinear_ = source_->trilinear;
   for (const scene::MarchSourcePtr& source : sources) {
@@ -530,7 +536,7 @@ void MarchUpload::plan_slabs(gl::Object& texture, const Texels& texels, const ch
   data_.bytes_ += static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) *
                   static_cast<std::uint64_t>(size.z) * 2 * texels.count;
   upload_.add([this, &texture, size, texels, what] {
-    texture = gl::make_texture_3d(gl_, texels.stored, size.x, size.y, size.z, what);
+    texture = gl::make_texture_3d(owner_, texels.stored, size.x, size.y, size.z, what);
   });
   // One layer of bricks per step bounds the memory.
   const int low = source_->box_low.z;
@@ -561,8 +567,8 @@ void MarchUpload::plan_brick() {
   data_.bytes_ += bytes;
   upload_.add([this, bytes] {
     const char* what = "creating the buffer of bricks";
-    data_.brick_values_ = gl::make_buffer(gl_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
-    data_.textures_[0] = gl::make_texture_buffer(gl_, GL_R16F, data_.brick_values_, what);
+    data_.brick_values_ = gl::make_buffer(owner_, bytes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+    data_.textures_[0] = gl::make_texture_buffer(owner_, GL_R16F, data_.brick_values_, what);
   });
   upload_.add_bytes(
       [this] {
@@ -573,8 +579,8 @@ void MarchUpload::plan_brick() {
     data_.bytes_ += changes;
     upload_.add([this, changes] {
       const char* what = "creating the buffer of brick changes";
-      data_.brick_changes_ = gl::make_buffer(gl_, changes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
-      data_.changes_ = gl::make_texture_buffer(gl_, GL_R16F, data_.brick_changes_, what);
+      data_.brick_changes_ = gl::make_buffer(owner_, changes, nullptr, GL_DYNAMIC_STORAGE_BIT, what);
+      data_.changes_ = gl::make_texture_buffer(owner_, GL_R16F, data_.brick_changes_, what);
     });
     upload_.add_bytes(
         [this] {
@@ -584,7 +590,8 @@ void MarchUpload::plan_brick() {
   }
   data_.bytes_ += source_->brick_slots.size() * 4;
   upload_.add([this, bricks] {
-    data_.textures_[1] = gl::make_texture_3d(gl_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
+    data_.textures_[1] =
+        gl::make_texture_3d(owner_, GL_R32UI, bricks.x, bricks.y, bricks.z, "creating the brick slots");
     gl_->PixelStorei(GL_UNPACK_ALIGNMENT, 4);
     gl_->TextureSubImage3D(data_.textures_[1].name(), 0, 0, 0, 0, bricks.x, bricks.y, bricks.z, GL_RED_INTEGER,
                            GL_UNSIGNED_INT, source_->brick_slots.data());
@@ -599,17 +606,18 @@ bool MarchData::is_wide() const {
 void MarchData::bind(const gl::Functions& gl) const {
   // All pages that a program may declare are bound. Extra ones repeat the last page and are not read.
   for (std::size_t i = 0; !cells_.empty() && i < max_pages; ++i)
-    gl.BindTextureUnit(core::CM_UNIT_CELLS + static_cast<GLuint>(i), cells_[std::min(i, cells_.size() - 1)].texture());
-  constexpr std::array<GLuint, 2> units{core::CM_UNIT_VOXELS, core::CM_UNIT_BRICK_SLOTS};
-  for (std::size_t i = 0; i < textures_.size(); ++i) {
-    if (textures_[i]) gl.BindTextureUnit(units[i], textures_[i].name());
-  }
-  for (std::size_t i = 0; i < voxel_channels_.size(); ++i) {
-    if (voxel_channels_[i])
-      gl.BindTextureUnit(core::CM_UNIT_CHANNEL_VOXELS + static_cast<GLuint>(i), voxel_channels_[i].name());
-  }
-  if (changes_) gl.BindTextureUnit(core::CM_UNIT_CHANGE_VOXELS, changes_.name());
-  if (channels_) gl.BindTextureUnit(core::CM_UNIT_CHANNELS, channels_.texture());
-  if (trees_) gl.BindTextureUnit(core::CM_UNIT_TREE, trees_.texture());
+    cells_[std::min(i, cells_.size() - 1)].bind(gl, core::CM_UNIT_CELLS + static_cast<GLuint>(i));
+  const auto bind_texture = [&](GLuint unit, const gl::Object& texture, GLenum target) {
+    if (texture) gl.BindTextureUnit(unit, texture.name(), target);
+  };
+  const GLenum values = march_ == March::brick ? GL_TEXTURE_BUFFER : GL_TEXTURE_3D;
+  bind_texture(core::CM_UNIT_VOXELS, textures_[0], values);
+  bind_texture(core::CM_UNIT_BRICK_SLOTS, textures_[1], GL_TEXTURE_3D);
+  for (std::size_t i = 0; i < voxel_channels_.size(); ++i)
+    bind_texture(core::CM_UNIT_CHANNEL_VOXELS + static_cast<GLuint>(i), voxel_channels_[i], GL_TEXTURE_3D);
+  bind_texture(core::CM_UNIT_CHANGE_VOXELS, changes_, values);
+  if (channels_) channels_.bind(gl, core::CM_UNIT_CHANNELS);
+  if (trees_) trees_.bind(gl, core::CM_UNIT_TREE);
 }
+
 }  // namespace cumulet::render

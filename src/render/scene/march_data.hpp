@@ -43,6 +43,8 @@ class MarchData {
   [[nodiscard]] std::size_t size() const { return parts_.size(); }
   /// In the order in which their sources were given.
   [[nodiscard]] const core::CmGrid& grid(std::size_t i = 0) const { return parts_.at(i).grid; }
+  /// Whether it consists of the grids of these sources, in this order, and was planned for pages of this size.
+  [[nodiscard]] bool is_of(const std::vector<scene::MarchSourcePtr>& sources, std::int64_t page_texels) const;
   /// Null: it is not uploaded. O(grids).
   [[nodiscard]] const core::CmGrid* grid(const scene::MarchSource& source) const;
   /// Tetrahedral grids: number of cells, and whether max_cells ended the refinement.
@@ -84,6 +86,7 @@ class MarchData {
   bool linear_ = false;
   bool trilinear_ = false;
   std::vector<Part> parts_;
+  std::int64_t page_texels_ = 0;  // wanted size of a page; 0: the driver's limit
   gl::Object brick_values_;
   gl::Object brick_changes_;
   std::vector<gl::WordHeap::Span> cells_;  // cell records, per page
@@ -98,7 +101,10 @@ class MarchData {
   std::uint64_t bytes_ = 0;
 };
 
-/// Uploads sources in steps. All calls need a current context and an active StateGuard.
+using MarchDataPtr = std::shared_ptr<const MarchData>;
+
+/// Uploads sources in steps. The data belong to the heap's functions, and may outlive those of the upload. All calls
+/// need a current context and an active StateGuard.
 class MarchUpload {
  public:
   using Sources = std::vector<scene::MarchSourcePtr>;
@@ -146,7 +152,8 @@ class MarchUpload {
   using FillSlab = std::function<void(std::span<std::uint16_t> slab, int first, int last)>;
   void plan_slabs(gl::Object& texture, const Texels& texels, const char* what, const FillSlab& fill);
 
-  gl::FunctionsPtr gl_;
+  gl::FunctionsPtr gl_;     // of the context that uploads: they keep the host's state
+  gl::FunctionsPtr owner_;  // of the objects
   gl::Limits limits_;
   const MarchData* before_;
   const BuiltGrids* built_;

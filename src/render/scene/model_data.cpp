@@ -127,7 +127,7 @@ scene::ModelWords ModelData::words_of(const scene::ModelSource& source) const {
 }
 
 void ModelData::bind(const gl::Functions& gl) const {
-  gl.BindTextureUnit(core::CM_UNIT_SCENE_WORDS, words_.texture());
+  words_.bind(gl, core::CM_UNIT_SCENE_WORDS);
   gl.BindTextureUnit(core::CM_UNIT_ATLAS, atlas_->texture.name());
 }
 

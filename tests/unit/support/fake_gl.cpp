@@ -92,6 +92,7 @@ struct FakeGl::Wrappers {
         }
       }
       fake->uploaded_ += bytes_of(args...);
+      if constexpr (F == Fn::NamedBufferStorage) fake->store(args...);
       if constexpr (F == Fn::UseProgram) fake->use(args...);
       if constexpr (starts(name, "DispatchCompute") || starts(name, "DrawArrays") || starts(name, "DrawElements")) {
         fake->used_.insert(fake->program_);
@@ -227,7 +228,18 @@ void FakeGl::made(const std::string& kind, GLsizei n, const GLuint* names) {
 
 void FakeGl::made(const std::string& kind, GLenum /*target*/, GLsizei n, const GLuint* names) { made(kind, n, names); }
 
+void FakeGl::store(GLuint buffer, GLsizeiptr size, const void* /*data*/, GLbitfield /*flags*/) {
+  buffers_[buffer] = static_cast<std::uint64_t>(size);
+}
+
+std::uint64_t FakeGl::buffer_bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& [name, size] : buffers_) sum += size;
+  return sum;
+}
+
 void FakeGl::deleted(const std::string& kind, std::uintptr_t name) {
+  if (kind == "Buffers") buffers_.erase(name);
   if (name != 0 && alive_[kind].erase(name) == 0) ++wrong_deletes_;
 }
 

@@ -44,6 +44,8 @@ class FakeGl {
   [[nodiscard]] std::uint64_t allocations() const { return allocations_; }
   /// Bytes copied from main memory to buffers and textures (4 bytes per texel).
   [[nodiscard]] std::uint64_t uploaded() const { return uploaded_; }
+  /// Size of all buffers that exist.
+  [[nodiscard]] std::uint64_t buffer_bytes() const;
   /// Name of the last allocation that was made to fail, "" if none.
   [[nodiscard]] const std::string& refused() const { return refused_; }
   /// Objects made and not deleted, by kind: "Buffers", "Textures", "Shader", "Sync", ...
@@ -82,6 +84,7 @@ class FakeGl {
   void made(const std::string& kind, GLenum target, GLsizei n, const GLuint* names);
   void deleted(const std::string& kind, std::uintptr_t name);
   void deleted(const std::string& kind, GLsizei n, const GLuint* names);
+  void store(GLuint buffer, GLsizeiptr size, const void* data, GLbitfield flags);
   void use(GLuint program);
   // Answers GL_COMPLETION_STATUS_KHR. All other queries would wait for the driver.
   bool answer(GLuint name, GLenum what, GLint* value);
@@ -95,6 +98,7 @@ class FakeGl {
   std::vector<std::uint64_t> calls_of_;  // indexed by function
   std::uint64_t allocations_ = 0;
   std::uint64_t uploaded_ = 0;
+  std::map<std::uintptr_t, std::uint64_t> buffers_;  // sizes by name
   std::int64_t fail_at_ = -1;
   bool fail_storage_ = false;
   bool fail_linking_ = false;
