@@ -296,7 +296,10 @@ class Generator:
                 hint, convert = ("Matrix", "matrix") if p.name == "to_world" else ("float", "seconds")
                 found[p.name] = f"{p.name}: {hint} | None = None", f'_support.{convert}({p.name}, "{p.name}")'
             elif kind == "float" and p.name == "points":
-                found[p.name] = f"{p.name}: Iterable[Tuple[float, float]]", f'_support.pairs({p.name}, "{p.name}")'
+                found[p.name] = f"{p.name}: Iterable[Tuple[float, float]]", f'_support.groups(2, {p.name}, "{p.name}")'
+            elif kind == "float" and p.name == "stops":
+                hint = "Iterable[Tuple[float, float, float, float]]"
+                found[p.name] = f"{p.name}: {hint}", f'_support.groups(4, {p.name}, "{p.name}")'
             elif counted and self.is_descriptor(kind):
                 found[p.name] = (f"{p.name}: Iterable[Mapping[str, Any]]",
                                  f'_support.structs(api.{kind}, {p.name}, "{p.name}")')

@@ -43,6 +43,7 @@
 #include "options.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
+#include "ramps.hpp"
 #include "render_viewer.hpp"
 #include "settled.hpp"
 #include "stats.hpp"
@@ -553,11 +554,7 @@ class Studio {
       sampling.light_groups = static_cast<std::uint32_t>(scene.light_groups.size());
     check(viewer_, cumulet_set_grid(viewer_.get(), &scene.grid));
     check(viewer_, cumulet_set_medium(viewer_.get(), &scene.medium));
-    for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
-      const auto& points = scene.ramps[i];
-      check(viewer_, cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i),
-                                      cumulet::settings::numbers_of(points), points.size()));
-    }
+    check(viewer_, cumulet::demo::set_ramps(viewer_.get(), scene));
     // The ground is set first, because the sky is computed for it.
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_sun_sky(viewer_.get(), &scene.light));

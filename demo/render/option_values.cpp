@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <image.hpp>
 #include <program.hpp>
 #include <ramp.hpp>
 #include <system_error>
@@ -142,6 +143,42 @@ settings::RampPoints parse_ramp(std::string_view text) {
   const std::string why = settings::ramp_refusal(points);
   if (!why.empty()) throw UsageError(in_quotes(text) + " " + why);
   return points;
+}
+
+namespace {
+
+// Parses "#rrggbb" (sRGB) or "R/G/B" (linear).
+std::array<float, 3> parse_color(std::string_view text) {
+  std::array<float, 3> rgb{};
+  if (text.starts_with('#')) {
+    std::uint32_t hex = 0;
+    const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), hex, 16);
+    if (text.size() != 7 || error != std::errc{} || end != text.data() + text.size())
+      throw UsageError(in_quotes(text) + " is not a color such as #ff8000");
+    for (std::size_t i = 0; i < 3; ++i)
+      rgb[i] = image::srgb_decode(static_cast<float>(hex >> (16 - 8 * i) & 0xFFU) / 255.0F);
+    return rgb;
+  }
+  const std::vector<std::string_view> parts = split(text, '/');
+  if (parts.size() != 3) throw UsageError(in_quotes(text) + " is not a color such as #ff8000 or 1/0.5/0");
+  for (std::size_t i = 0; i < 3; ++i) rgb[i] = static_cast<float>(parse_number(parts[i]));
+  return rgb;
+}
+
+}  // namespace
+
+settings::ColorStops parse_color_ramp(const settings::ColorRampInfo& info, std::string_view text) {
+  settings::ColorStops stops;
+  if (text == "none") return stops;
+  for (const std::string_view stop : split(text, ',')) {
+    const std::vector<std::string_view> pair = split(stop, ':');
+    if (pair.size() != 2) throw UsageError(in_quotes(stop) + " is not a pair INPUT:COLOR, such as 0.5:#ff8000");
+    const std::array<float, 3> rgb = parse_color(pair[1]);
+    stops.push_back({static_cast<float>(parse_number(pair[0])), rgb[0], rgb[1], rgb[2]});
+  }
+  const std::string why = settings::color_ramp_refusal(info, stops);
+  if (!why.empty()) throw UsageError(in_quotes(text) + " " + why);
+  return stops;
 }
 
 std::vector<std::string> parse_light_groups(std::string_view text) {

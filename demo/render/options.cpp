@@ -241,6 +241,11 @@ void add_medium_options(CLI::App& app, const char* group, SceneOptions& scene) {
     add(
         app, group, settings::ramps[i].flag, "X:Y,X:Y,...|none",
         [&points = scene.ramps[i]](const std::string& text) { points = parse_ramp(text); }, settings::ramps[i].help);
+    const settings::ColorRampInfo& info = settings::color_ramps[i];
+    add(
+        app, group, info.flag, "X:COLOR,X:COLOR,...|none",
+        [&info, &stops = scene.color_ramps[i]](const std::string& text) { stops = parse_color_ramp(info, text); },
+        info.help);
   }
 }
 

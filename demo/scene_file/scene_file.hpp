@@ -70,8 +70,9 @@ struct SceneVolume : VolumeFile {
   std::vector<std::array<double, 16>> transforms;  // instance transforms, applied after to_world; empty: one instance
   SceneShutter shutter;                            // for all instances
   cumulet_medium_desc medium{};
-  std::array<settings::RampPoints, settings::ramps.size()> ramps;  // indexed by cumulet_ramp
-  SceneSequence sequence;                                          // for a volume that is a sequence
+  std::array<settings::RampPoints, settings::ramps.size()> ramps;              // indexed by cumulet_ramp
+  std::array<settings::ColorStops, settings::color_ramps.size()> color_ramps;  // indexed by cumulet_ramp
+  SceneSequence sequence;                                                      // for a volume that is a sequence
   bool auto_density_scale = true;  // medium.density_scale is derived from the volume when it is loaded
 
   SceneVolume();

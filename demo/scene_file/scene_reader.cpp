@@ -236,6 +236,20 @@ class Reader {
     if (!why.empty()) wrong(key, why);
   }
 
+  void color_ramp(const settings::ColorRampInfo& info, settings::ColorStops& out) {
+    const std::optional<Json> value = take(info.key);
+    if (!value) return;
+    if (!value->is_array()) wrong(info.key, "is not a list of points");
+    out.clear();
+    for (const Json& stop : *value) {
+      if (!stop.is_array() || stop.size() != 4) wrong(info.key, "has a point that is not four numbers");
+      settings::ColorStop& numbers = out.emplace_back();
+      for (std::size_t i = 0; i < 4; ++i) numbers[i] = static_cast<float>(checked(info.key, stop[i], {}));
+    }
+    const std::string why = settings::color_ramp_refusal(info, out);
+    if (!why.empty()) wrong(info.key, why);
+  }
+
   [[nodiscard]] bool has(const std::string& key) { return find(key).value != nullptr; }
 
   [[noreturn]] void wrong(const std::string& key, const std::string& cause) const {
@@ -496,7 +510,10 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   reader.text("medium.velocity_grid", volume.velocity_grid);
   reader.choice("volume.up", up_names, volume.up);
   volume.auto_density_scale = reader.word("medium.density_scale", "auto");
-  for (std::size_t i = 0; i < volume.ramps.size(); ++i) reader.ramp(settings::ramps[i].key, volume.ramps[i]);
+  for (std::size_t i = 0; i < volume.ramps.size(); ++i) {
+    reader.ramp(settings::ramps[i].key, volume.ramps[i]);
+    reader.color_ramp(settings::color_ramps[i], volume.color_ramps[i]);
+  }
   if (format == SceneFormat::first) return;
   read_transform(reader, "volume.", volume.to_world);
   reader.transforms("volume.transforms", volume.transforms);

@@ -191,6 +191,10 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
     Json points = Json::array();
     for (const auto& [value, result] : volume.ramps[i]) points.push_back({shortest(value), shortest(result)});
     if (!points.empty()) writer.put(settings::ramps[i].key, points);
+    Json stops = Json::array();
+    for (const auto& [value, red, green, blue] : volume.color_ramps[i])
+      stops.push_back({shortest(value), shortest(red), shortest(green), shortest(blue)});
+    if (!stops.empty()) writer.put(settings::color_ramps[i].key, stops);
   }
 }
 

@@ -358,9 +358,9 @@ def matrices(values: Iterable[Any], name: str) -> Any:
     return (ctypes.c_double * (16 * len(flat)))(*itertools.chain.from_iterable(flat))
 
 
-def pairs(points: Iterable[Any], name: str) -> Any:
-    flat = [numbers(ctypes.c_float, 2, point, name) for point in points]
-    return (ctypes.c_float * (2 * len(flat)))(*itertools.chain.from_iterable(flat))
+def groups(size: int, values: Iterable[Any], name: str) -> Any:
+    flat = [numbers(ctypes.c_float, size, value, name) for value in values]
+    return (ctypes.c_float * (size * len(flat)))(*itertools.chain.from_iterable(flat))
 
 
 def matrix(value: Any, name: str) -> Any:

@@ -48,11 +48,14 @@ struct Medium {
   }
 };
 
-/// Ramps (1-D transfer functions) that are applied to grid values first.
+/// Ramps (1-D transfer functions) of grid values.
 struct Ramps {
   volume::Ramp density = {};
   volume::Ramp temperature = {};
   volume::Ramp flame = {};
+  volume::ColorRamp density_colors = {};
+  volume::ColorRamp temperature_colors = {};
+  volume::ColorRamp flame_colors = {};
 };
 
 }  // namespace cumulet::viewer

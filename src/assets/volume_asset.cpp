@@ -15,8 +15,8 @@ namespace cumulet::viewer {
 namespace {
 
 // True if the frame's voxels are in main memory and have channels that are averaged with the density as weight.
-bool is_weighted(const volume::VolumeFrame& frame, bool in_gl) {
-  return !in_gl && (frame.color || frame.anisotropy || frame.velocity);
+bool is_weighted(const volume::VolumeFrame& frame, const scene::DensityRamps& ramps, bool in_gl) {
+  return !in_gl && (frame.color || frame.anisotropy || frame.velocity || !ramps.colors.empty());
 }
 
 // Returns the mean with the momentum of another frame; nullopt if either has none.
@@ -250,16 +250,16 @@ scene::Emission VolumeAsset::emission_by(const scene::Emission& emission) const 
 }
 
 VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::VolumeFrame>& frame,
-                                            const volume::Ramp& ramp, Progress& progress) const {
-  if (ramp.empty() && !is_extreme()) return {frame, ramp};
-  const double unit = ramped(ramp, progress).density.unit;
-  if (unit == 1.0) return {frame, ramp};
+                                            const scene::DensityRamps& ramps, Progress& progress) const {
+  if (ramps.values.empty() && !is_extreme()) return {frame, ramps};
+  const double unit = ramped(ramps.values, progress).density.unit;
+  if (unit == 1.0) return {frame, ramps};
   volume::VolumeFrame copy = *frame;
-  copy.density = volume::in_units_of(unit, volume::apply(ramp, frame->density, &progress), &progress);
-  return {make_deferred_delete<const volume::VolumeFrame>(std::move(copy)), {}};
+  copy.density = volume::in_units_of(unit, volume::apply(ramps.values, frame->density, &progress), &progress);
+  return {make_deferred_delete<const volume::VolumeFrame>(std::move(copy)), {{}, ramps.colors}, frame};
 }
 
-grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
+grid::Channels VolumeAsset::channels(const scene::DensityRamps& ramps, const scene::Emission& emission,
                                      bool anisotropic, Progress& progress, const Log& log) const {
   const scene::Emission given = emission_by(emission);
   const auto field = [&]<class Field>(std::type_identity<Field>, auto values) {
@@ -280,48 +280,53 @@ grid::Channels VolumeAsset::channels(const volume::Ramp& density_ramp, const sce
     put(glowing_, Glowing{given, field(colors, std::move(emissive))});
   }
   const auto weighs = [&](const std::shared_ptr<const volume::VolumeFrame>& frame) {
-    const bool weighted = is_weighted(*frame, static_cast<bool>(in_gl_));
-    return weighted ? weighing(frame, density_ramp, progress) : Weighing{frame, density_ramp};
+    const bool weighted = is_weighted(*frame, ramps, static_cast<bool>(in_gl_));
+    return weighted ? weighing(frame, ramps, progress) : Weighing{frame, ramps};
   };
-  const bool weighs_anew = !weighted_ || weighted_->density_ramp != density_ramp;
+  const bool weighs_anew = !weighted_ || weighted_->ramps != ramps;
   const bool turns_anew = anisotropic && (weighs_anew || !weighted_->anisotropic);
-  Weighing at_open{frame_, density_ramp};
-  Weighing at_close{close_, density_ramp};
+  Weighing at_open{frame_, ramps};
+  Weighing at_close{close_, ramps};
   if (weighs_anew || turns_anew) {
     at_open = weighs(frame_);
     if (close_) at_close = weighs(close_);
   }
+  const auto scattering_at = [&](const Weighing& at) {
+    return scene::scattering_of(*at.frame, at.ramps, &progress, &at.colored_by->density);
+  };
+  const auto forward_at = [&](const Weighing& at) {
+    return scene::forward_of(*at.frame, at.ramps, &progress, &at.colored_by->density);
+  };
   if (weighs_anew) {
     drop(latticed_);
     drop(weighted_);
-    auto scattering = in_gl_ ? in_gl_->scattering() : scene::scattering_of(*at_open.frame, at_open.ramp, &progress);
+    auto scattering = in_gl_ ? in_gl_->scattering() : scattering_at(at_open);
     auto momentum = in_gl_ ? in_gl_->momentum()
-                           : scene::momentum_of(*at_open.frame, at_open.ramp, &progress, log,
+                           : scene::momentum_of(*at_open.frame, at_open.ramps.values, &progress, log,
                                                 close != nullptr ? scene::fastest_of(*close) : 0.0);
     if (close != nullptr) {
-      scattering = scene::mean_of(scattering, scene::scattering_of(*at_close.frame, at_close.ramp, &progress),
-                                  "density", &progress);
-      momentum = mean_momentum(std::move(momentum), *at_close.frame, at_close.ramp, progress, log);
+      scattering = scene::mean_of(scattering, scattering_at(at_close), "density", &progress);
+      momentum = mean_momentum(std::move(momentum), *at_close.frame, at_close.ramps.values, progress, log);
     }
     grid::Channels made;
     made.scattering = field(colors, std::move(scattering));
     made.momentum = field(motion, std::move(momentum));
-    put(weighted_, Weighted{density_ramp, std::move(made)});
+    put(weighted_, Weighted{ramps, std::move(made)});
   }
   if (turns_anew) {
-    auto forward = in_gl_ ? in_gl_->forward() : scene::forward_of(*at_open.frame, at_open.ramp, &progress);
+    auto forward = in_gl_ ? in_gl_->forward() : forward_at(at_open);
     if (close != nullptr) {
-      const auto closing = scene::forward_of(*at_close.frame, at_close.ramp, &progress);
+      const auto closing = forward_at(at_close);
       forward = scene::mean_of(forward ? &*forward : nullptr, closing ? &*closing : nullptr, "density", &progress);
     }
-    Weighted made{density_ramp, weighted_->fields, true};
+    Weighted made{ramps, weighted_->fields, true};
     made.fields.forward = field(numbers, std::move(forward));
     put(weighted_, std::move(made));
   }
   grid::Channels made = weighted_->fields;
   made.emission = glowing_->emission;
   if (!anisotropic) made.forward = nullptr;
-  made.ends = close_ ? ramped(density_ramp, progress).ends : nullptr;
+  made.ends = close_ ? ramped(ramps.values, progress).ends : nullptr;
   return made;
 }
 

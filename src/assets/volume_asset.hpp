@@ -116,9 +116,9 @@ class VolumeAsset {
   /// True if density without a ramp has another unit than 1.
   [[nodiscard]] bool is_extreme() const { return unit() != 1.0; }
   /// Returns the fields beside density. anisotropic: include anisotropy. For a GPU-resident volume they were computed
-  /// on the GPU. The last result is cached, because other thresholds and cameras need the same. log: receives messages
-  /// about omitted fields when the result is computed.
-  [[nodiscard]] grid::Channels channels(const volume::Ramp& density_ramp, const scene::Emission& emission,
+  /// on the GPU, without color ramps. The last result is cached, because other thresholds and cameras need the same.
+  /// log: receives messages about omitted fields when the result is computed.
+  [[nodiscard]] grid::Channels channels(const scene::DensityRamps& ramps, const scene::Emission& emission,
                                         bool anisotropic, Progress& progress, const Log& log = {}) const;
 
  private:
@@ -131,13 +131,14 @@ class VolumeAsset {
   [[nodiscard]] Frames frames() const;
   // Unit of density without a ramp.
   [[nodiscard]] double unit() const;
-  // Source of the channels weighted by density: the frame, and the ramp that has not been applied to its density.
+  // Source of the channels weighted by density: the frame, and the ramps that have not been applied to its density.
   struct Weighing {
     std::shared_ptr<const volume::VolumeFrame> frame;
-    volume::Ramp ramp;
+    scene::DensityRamps ramps;
+    std::shared_ptr<const volume::VolumeFrame> colored_by = frame;  // its densities have colors
   };
-  [[nodiscard]] Weighing weighing(const std::shared_ptr<const volume::VolumeFrame>& frame, const volume::Ramp& ramp,
-                                  Progress& progress) const;
+  [[nodiscard]] Weighing weighing(const std::shared_ptr<const volume::VolumeFrame>& frame,
+                                  const scene::DensityRamps& ramps, Progress& progress) const;
   template <class Kept, class Made>
   void put(Kept& kept, Made&& made) const {
     const std::scoped_lock lock(mutex_);
@@ -195,7 +196,7 @@ class VolumeAsset {
   };
   mutable std::optional<Glowing> glowing_;
   struct Weighted {
-    volume::Ramp density_ramp;
+    scene::DensityRamps ramps;
     grid::Channels fields;
     bool anisotropic = false;  // whether fields has the anisotropy, if the volume has one
   };

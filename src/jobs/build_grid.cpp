@@ -60,7 +60,8 @@ bool builds_on_gpu(const Log& log, const VolumeAsset& volume, const BuildSetting
 
 bool needs_values(const VolumeAsset& volume, const BuildSettings& settings) {
   return settings.march != scene::March::tet || settings.on != BuildOn::gpu || interpolates(settings) ||
-         !settings.density_ramp.empty() || volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
+         !settings.density_ramp.empty() || !settings.density_colors.empty() || settings.emission.has_color_ramp() ||
+         volume.is_extreme() || (settings.shutter_seconds != 0.0 && volume.moves());
 }
 
 void log_limited(const Log& log, std::uint64_t most, std::uint64_t max_cells) {
@@ -90,8 +91,8 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
   const double taken = watch.lap();
   const auto [voxels, statistics, unit] = shown.density(settings.density_ramp, progress, built.seconds.statistics);
   watch.lap();
-  const grid::Channels channels =
-      shown.channels(settings.density_ramp, settings.emission, settings.anisotropic, progress, log);
+  const grid::Channels channels = shown.channels({settings.density_ramp, settings.density_colors}, settings.emission,
+                                                 settings.anisotropic, progress, log);
   built.seconds.statistics += taken + watch.lap();
   progress.begin(Progress::Stage::refining);
   const auto finished = [unit = unit, depth = unit * statistics->mean_optical_depth()](scene::MarchSource source) {

@@ -20,6 +20,7 @@ struct BuildSettings {
   grid::Interpolation interpolation = grid::Interpolation::nearest;
   grid::RefineSettings refine;
   volume::Ramp density_ramp;
+  volume::ColorRamp density_colors;
   scene::Emission emission;
   bool anisotropic = true;       ///< the volume's anisotropy grid replaces the medium's anisotropy
   double shutter_seconds = 0.0;  ///< for volumes with velocities

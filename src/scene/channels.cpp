@@ -98,18 +98,29 @@ class CellEmission {
   /// Returns the emission for these field values.
   [[nodiscard]] vec3 operator()(float temperature_value, float flame_value) const {
     const float temperature = emission_.temperature_ramp(temperature_value);
-    glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_color_;
-    if (temperature > 0.0F && emission_.blackbody > 0.0) {
-      const double kelvin =
-          emission_.temperature_offset + emission_.kelvin_a_value() * static_cast<double>(temperature);
-      constexpr double hottest = 1e6;
-      const vec3 body = black_body_.emission(static_cast<float>(std::min(kelvin, hottest)), intensity_of(emission_));
-      light += glm::dvec3(body) * glm::dvec3(emission_.blackbody_tint);
-    }
+    glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_light(flame_value);
+    if (temperature > 0.0F && emission_.blackbody > 0.0)
+      light += hot(temperature_value, temperature) * glm::dvec3(emission_.blackbody_tint);
     return {glm::min(light, glm::dvec3(max_radiance))};
   }
 
  private:
+  // Returns the color times the strength.
+  [[nodiscard]] glm::dvec3 flame_light(float field_value) const {
+    if (emission_.flame_colors.empty()) return flame_color_;
+    return glm::dvec3(emission_.flame_colors(field_value)) * emission_.flame_strength;
+  }
+  // Returns the emission of a field value whose mapped value is `temperature`, without the tint.
+  [[nodiscard]] glm::dvec3 hot(float field_value, float temperature) const {
+    constexpr double hottest = 1e6;
+    const double kelvin =
+        std::min(emission_.temperature_offset + emission_.kelvin_a_value() * static_cast<double>(temperature), hottest);
+    if (emission_.temperature_colors.empty())
+      return {black_body_.emission(static_cast<float>(kelvin), intensity_of(emission_))};
+    return light::black_body_radiance(kelvin, double{intensity_of(emission_)}) *
+           glm::dvec3(emission_.temperature_colors(field_value));
+  }
+
   Emission emission_;
   glm::dvec3 flame_color_;
   light::BlackBody black_body_;
@@ -121,14 +132,31 @@ void read_density(const volume::VolumeFrame& frame, const volume::Ramp& ramp, co
   for (float& value : density) value = ramp(value);
 }
 
+// Sources of the scattering of one frame.
+struct ScatterSource {
+  const volume::VolumeFrame& frame;
+  const DensityRamps& ramps;
+  const ScalarVolume& colored_by;
+
+  [[nodiscard]] bool colored() const { return frame.color || !ramps.colors.empty(); }
+};
+
 // The fields of one brick that determine scattering.
 struct Scatters {
   Values density{};
   std::array<Values, 3> color{};
 
-  void read_brick(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp, const ivec3& origin) {
-    read_density(frame, density_ramp, origin, density);
-    for (std::size_t i = 0; frame.color && i < 3; ++i) read((*frame.color)[i], origin, color[i]);
+  void read_brick(const ScatterSource& source, const ivec3& origin) {
+    for (std::size_t i = 0; source.frame.color && i < 3; ++i) read((*source.frame.color)[i], origin, color[i]);
+    if (!source.ramps.colors.empty()) {
+      read(source.colored_by, origin, density);
+      for (std::size_t v = 0; v < brick_voxels; ++v) {
+        const vec3 by_density = source.ramps.colors(density[v]);
+        for (std::size_t i = 0; i < 3; ++i)
+          color[i][v] = by_density[static_cast<int>(i)] * (source.frame.color ? std::min(color[i][v], 1.0F) : 1.0F);
+      }
+    }
+    read_density(source.frame, source.ramps.values, origin, density);
   }
   [[nodiscard]] vec3 colored(std::size_t v) const {
     return density[v] * glm::min(vec3(color[0][v], color[1][v], color[2][v]), vec3(1.0F));
@@ -247,19 +275,21 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
   return radiance;
 }
 
-std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
-                                                        const volume::Ramp& density_ramp, const Progress* progress) {
-  if (!frame.color || frame.density.empty()) return std::nullopt;
+std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame, const DensityRamps& ramps,
+                                                        const Progress* progress, const ScalarVolume* colored_by) {
+  const ScatterSource source{frame, ramps, colored_by != nullptr ? *colored_by : frame.density};
+  if (!source.colored() || frame.density.empty()) return std::nullopt;
   BrickSet set("density");
   set.add(frame.density);
   return fields_of<3, Scatters>(
       frame.density.index_to_world, set.take(), "scattering", progress,
-      [&](const ivec3& origin, Scatters& here) { here.read_brick(frame, density_ramp, origin); },
+      [&](const ivec3& origin, Scatters& here) { here.read_brick(source, origin); },
       [](const Scatters& here, std::size_t v) { return here.colored(v); });
 }
 
-std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp,
-                                       const Progress* progress) {
+std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const DensityRamps& ramps,
+                                       const Progress* progress, const ScalarVolume* colored_by) {
+  const ScatterSource source{frame, ramps, colored_by != nullptr ? *colored_by : frame.density};
   if (!frame.anisotropy || frame.density.empty()) return std::nullopt;
   BrickSet set("density");
   set.add(frame.density);
@@ -270,11 +300,11 @@ std::optional<ScalarVolume> forward_of(const volume::VolumeFrame& frame, const v
   return std::move(fields_of<1, Read>(
       frame.density.index_to_world, set.take(), "anisotropy", progress,
       [&](const ivec3& origin, Read& here) {
-        here.scatters.read_brick(frame, density_ramp, origin);
+        here.scatters.read_brick(source, origin);
         for (std::size_t i = 0; i < 2; ++i) read((*frame.anisotropy)[i], origin, here.anisotropy[i]);
       },
       [&](const Read& here, std::size_t v) {
-        const float scatters = frame.color ? luminance(here.scatters.colored(v)) : here.scatters.density[v];
+        const float scatters = source.colored() ? luminance(here.scatters.colored(v)) : here.scatters.density[v];
         return glm::vec1(scatters * (0.5F + 0.5F * (here.anisotropy[0][v] - here.anisotropy[1][v])));
       })[0]);
 }

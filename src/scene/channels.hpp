@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <glm/glm.hpp>
 #include <optional>
+#include <utility>
 
 #include "base/log.hpp"
 #include "base/shared_code.hpp"
@@ -29,36 +30,57 @@ struct Emission {
   glm::vec3 blackbody_tint{1.0F};
   volume::Ramp temperature_ramp = {};  ///< applied to field values before offset and scale
   volume::Ramp flame_ramp = {};
+  volume::ColorRamp temperature_colors = {};  ///< of field values; replaces the colors of black bodies
+  volume::ColorRamp flame_colors = {};        ///< of field values; replaces flame_color
   bool operator==(const Emission&) const = default;
 
   [[nodiscard]] double kelvin_a_value() const { return temperature_scale.value_or(1500.0); }
 
+  /// Whether it has a color ramp. Shaders do not evaluate them.
+  [[nodiscard]] bool has_color_ramp() const { return !temperature_colors.empty() || !flame_colors.empty(); }
   /// Whether a flame field emits with these settings.
   [[nodiscard]] bool burns() const { return flame_strength > 0.0 && flame_color != glm::vec3(0.0F); }
   /// Whether a temperature field emits with these settings.
   [[nodiscard]] bool is_hot() const { return blackbody > 0.0 && blackbody_tint != glm::vec3(0.0F); }
 };
 
-/// Converts the settings for shaders (glsl/grid/brick_products.comp).
+/// Maps a density field to scattering.
+struct DensityRamps {
+  volume::Ramp values = {};
+  volume::ColorRamp colors = {};  ///< of field values before `values`; factor of the color
+
+  DensityRamps() = default;
+  // A ramp of values alone.
+  DensityRamps(volume::Ramp ramp) : values(std::move(ramp)) {}  // NOLINT(google-explicit-constructor)
+  DensityRamps(volume::Ramp ramp, volume::ColorRamp color_ramp)
+      : values(std::move(ramp)), colors(std::move(color_ramp)) {}
+  bool operator==(const DensityRamps&) const = default;
+};
+
+/// Converts the settings for shaders (glsl/grid/brick_products.comp). They must not have a color ramp.
 core::CmBrickEmissive shader_emissive(const Emission& emission, const light::BlackBody& body);
 
-/// Returns flame * strength * color + black-body emission of the temperature: radiance per world unit of length, linear
-/// Rec. 709, per voxel on the lattice of the fields. Returns nullopt if there is no such field or none of them emits.
-/// O(bricks of both) time and memory. Throws Error(unsupported) if tiles or a background with emission fill more than
-/// 2^27 voxels.
+/// Returns flame * strength * color + emission of the temperature, with color ramps: radiance per world unit of length,
+/// linear Rec. 709, per voxel on the lattice of the fields. Returns nullopt if there is no such field or none of them
+/// emits. O(bricks of both) time and memory. Throws Error(unsupported) if tiles or a background with emission fill more
+/// than 2^27 voxels.
 std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame& frame, const Emission& emission,
                                                       const Progress* progress = nullptr);
 
-/// Returns ramp(density) * color per voxel, with color components clamped to 1; black where the frame has no color.
-/// Returns nullopt if the frame has no color at all or no density. Errors as for emission_of().
+/// Returns ramp(density) * color ramp * color per voxel, with color components clamped to 1; black where a color has no
+/// value. Returns nullopt if there is neither a color nor a color ramp, or no density. Errors as for emission_of().
+/// colored_by: the densities that the color ramp maps; null: those of the frame.
 std::optional<grid::RgbField::Components> scattering_of(const volume::VolumeFrame& frame,
-                                                        const volume::Ramp& density_ramp = {},
-                                                        const Progress* progress = nullptr);
+                                                        const DensityRamps& ramps = {},
+                                                        const Progress* progress = nullptr,
+                                                        const volume::ScalarVolume* colored_by = nullptr);
 
-/// Returns the luminance of ramp(density) * color, with color components clamped to 1, times (1 + anisotropy) / 2, per
-/// voxel. Returns nullopt if the frame has no anisotropy or no density. Errors as for emission_of().
-std::optional<volume::ScalarVolume> forward_of(const volume::VolumeFrame& frame, const volume::Ramp& density_ramp = {},
-                                               const Progress* progress = nullptr);
+/// Returns the luminance of scattering_of(), or ramp(density) if that is nullopt, times (1 + anisotropy) / 2, per
+/// voxel. Returns nullopt if the frame has no anisotropy or no density. Errors as for emission_of(). colored_by: as for
+/// scattering_of().
+std::optional<volume::ScalarVolume> forward_of(const volume::VolumeFrame& frame, const DensityRamps& ramps = {},
+                                               const Progress* progress = nullptr,
+                                               const volume::ScalarVolume* colored_by = nullptr);
 
 /// Returns the voxelwise mean of two fields on one lattice; null counts as 0 everywhere. Returns nullopt if the mean is
 /// 0 everywhere. Errors as for emission_of(); what: name of the field in the message.

@@ -1,6 +1,7 @@
 #pragma once
 
-// Ramps (transfer functions) of grid values (cumulet_set_ramp): their texts for users, and checks of their points.
+// Ramps and color ramps (transfer functions) of grid values (cumulet_set_ramp, cumulet_set_color_ramp): their texts for
+// users, and checks of their points.
 
 #include <cumulet/cumulet.h>
 
@@ -21,8 +22,16 @@ using RampPoint = std::array<float, 2>;
 /// Empty: values are unchanged.
 using RampPoints = std::vector<RampPoint>;
 
-/// Returns the points in the form that cumulet_set_ramp takes.
-inline const float* numbers_of(const RampPoints& points) { return points.empty() ? nullptr : points.front().data(); }
+/// A grid value, and its color: linear Rec. 709.
+using ColorStop = std::array<float, 4>;
+/// Empty: no color ramp.
+using ColorStops = std::vector<ColorStop>;
+
+/// Returns the points or stops in the form that cumulet_set_ramp and cumulet_set_color_ramp take.
+template <class Points>
+const float* numbers_of(const Points& points) {
+  return points.empty() ? nullptr : points.front().data();
+}
 
 /// The names and texts of a ramp; fields as in SettingInfo.
 struct RampInfo {
@@ -53,6 +62,37 @@ inline constexpr std::array ramps = {
              "Flame point"}};
 static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
 
+/// The names and texts of a color ramp; fields as in SettingInfo.
+struct ColorRampInfo {
+  const char* name;
+  const char* key;
+  const char* flag;
+  const char* help;
+  const char* label;
+  const char* tip;
+  float most;  // maximum of a color component
+};
+
+/// Indexed by the ramp enum of cumulet.h.
+inline constexpr std::array color_ramps = {
+    ColorRampInfo{"density", "medium.density_color_ramp", "--density-color-ramp",
+                  "Colors of scattered light by density, a factor of the albedo: \"0:#80a0ff,1:1/0.8/0.6\", sRGB or "
+                  "linear (default: none)",
+                  "Density colors",
+                  "Scatter color for each value of the density grid. It multiplies the albedo. The density ramp does "
+                  "not move it.",
+                  1.0F},
+    ColorRampInfo{"temperature", "medium.temperature_color_ramp", "--temperature-color-ramp",
+                  "Colors of emitted light by temperature, instead of those of black bodies (default: none)",
+                  "Temperature colors",
+                  "Emission color for each value of the temperature grid, instead of that of a black body. The black "
+                  "body sets the brightness.",
+                  1e30F},
+    ColorRampInfo{"flame", "medium.flame_color_ramp", "--flame-color-ramp",
+                  "Colors of emitted light by flame, instead of the flame color (default: none)", "Flame colors",
+                  "Emission color for each value of the flame grid, instead of the flame color.", 1e30F}};
+static_assert(color_ramps.size() == ramps.size());
+
 inline constexpr std::size_t max_ramp_points = 32;
 inline constexpr float max_ramp_value = 1e30F;  ///< maximum of values and of mapped values
 
@@ -75,6 +115,29 @@ inline std::string ramp_refusal(std::span<const RampPoint> points) {
       return "has a point " + text(points[i]) + " whose output is not from 0 to 1e30";
     if (i > 0 && !(value > points[i - 1][0]))
       return "has a point " + text(points[i]) + " whose input is not above that of " + text(points[i - 1]);
+  }
+  return "";
+}
+
+/// Returns a stop as "0.5:1/0.8/0.6".
+inline std::string color_stop_text(const ColorStop& stop) {
+  return number_text(stop[0]) + ':' + number_text(stop[1]) + '/' + number_text(stop[2]) + '/' + number_text(stop[3]);
+}
+
+/// Returns why the stops of a color ramp are rejected, as text that follows its name; "" if they are accepted.
+inline std::string color_ramp_refusal(const ColorRampInfo& info, std::span<const ColorStop> stops) {
+  if (std::string why = ramp_count_refusal(stops.size()); !why.empty()) return why;
+  for (std::size_t i = 0; i < stops.size(); ++i) {
+    const ColorStop& stop = stops[i];
+    if (!(std::abs(stop[0]) <= max_ramp_value))
+      return "has a point " + color_stop_text(stop) + " whose input is not from -1e30 to 1e30";
+    for (std::size_t c = 1; c < stop.size(); ++c) {
+      if (!(stop[c] >= 0.0F && stop[c] <= info.most))
+        return "has a point " + color_stop_text(stop) + " whose color is not from 0 to " + number_text(info.most);
+    }
+    if (i > 0 && !(stop[0] > stops[i - 1][0]))
+      return "has a point " + color_stop_text(stop) + " whose input is not above that of " +
+             color_stop_text(stops[i - 1]);
   }
   return "";
 }

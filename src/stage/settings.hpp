@@ -106,6 +106,8 @@ struct GroundSettings {
   scene::Emission emission = medium.field_emission;
   emission.temperature_ramp = ramps.temperature;
   emission.flame_ramp = ramps.flame;
+  emission.temperature_colors = ramps.temperature_colors;
+  emission.flame_colors = ramps.flame_colors;
   return emission;
 }
 

@@ -162,6 +162,7 @@ BuildSettings VolumeStage::settings_of(const Shown& shown) {
   const Medium& medium = shown.settings.medium;
   BuildSettings settings = grid_.build;
   settings.density_ramp = shown.settings.ramps.density;
+  settings.density_colors = shown.settings.ramps.density_colors;
   settings.emission = emission_of(medium, shown.settings.ramps);
   settings.refine.density_scale = medium.density_scale * scene::mean_stretch(shown.settings.to_world);
   settings.refine.anisotropy = scene::mean_cosine(medium.phase);

@@ -362,6 +362,7 @@ void VolumeStage::set_grid(const GridSettings& settings) {
 void VolumeStage::take_medium(double density_scale) {
   grid_.build.emission = field_emission();
   grid_.build.density_ramp = ramps_.density;
+  grid_.build.density_colors = ramps_.density_colors;
   grid_.build.refine.density_scale = density_scale;
   grid_.build.refine.anisotropy = scene::mean_cosine(medium_.phase);
   grid_.build.anisotropic = medium_.phase.may_vary();
@@ -371,8 +372,8 @@ void VolumeStage::take_medium(double density_scale) {
 scene::Emission VolumeStage::field_emission() const { return emission_of(medium_, ramps_); }
 
 void VolumeStage::set_ramps(const Ramps& ramps) {
-  const bool other_density = ramps.density != ramps_.density;
-  const bool other_emission = ramps.temperature != ramps_.temperature || ramps.flame != ramps_.flame;
+  const bool other_density = ramps.density != ramps_.density || ramps.density_colors != ramps_.density_colors;
+  const bool other_emission = emission_of(medium_, ramps) != field_emission();
   if (!other_density && !other_emission) return;
   ramps_ = ramps;
   take_medium();

@@ -7,9 +7,7 @@
 #include "base/murmur_hash.hpp"
 #include "render/film/mattes.hpp"
 #include "settings/aov_table.hpp"
-#include "settings/ramp.hpp"
 #include "viewer/c_lights.hpp"
-#include "viewer/c_ramp.hpp"
 #include "viewer/c_settings.hpp"
 #include "viewer/c_viewer.hpp"
 
@@ -434,15 +432,6 @@ cumulet_status cumulet_set_grid(cumulet_viewer* viewer, const cumulet_grid_desc*
 
 cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumulet_medium_desc* desc) {
   return with_state(viewer, [&](core::Viewer& v) { v.set_medium(core::Medium::of(read_settings(desc))); });
-}
-
-cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points, uint64_t count) {
-  return with_state(viewer, [&](core::Viewer& v) {
-    ParsedRamp read = read_ramp(ramp, points, count);
-    core::Ramps ramps = v.ramps();
-    ramps.*read.target = std::move(read.ramp);
-    v.set_ramps(ramps);
-  });
 }
 
 cumulet_status cumulet_set_sun_sky(cumulet_viewer* viewer, const cumulet_sun_sky_desc* desc) {

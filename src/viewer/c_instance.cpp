@@ -15,7 +15,7 @@ using cumulet::viewer::Instance;
 using cumulet::viewer::InstanceSettings;
 using cumulet::viewer::Medium;
 
-// Everything except the ramps.
+// Everything except the ramps and color ramps.
 InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   const cumulet_instance_desc d = read_desc(desc, "cumulet_instance_desc");
   require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
@@ -73,6 +73,14 @@ cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ram
                                          uint64_t count) {
   return on(instance, "instance", [&](Instance& i) {
     auto read = read_ramp(ramp, points, count);
+    i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.target, read.ramp); });
+  });
+}
+
+cumulet_status cumulet_instance_set_color_ramp(cumulet_instance* instance, cumulet_ramp ramp, const float* stops,
+                                               uint64_t count) {
+  return on(instance, "instance", [&](Instance& i) {
+    auto read = read_color_ramp(ramp, stops, count);
     i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.target, read.ramp); });
   });
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// A host's ramp (1-D transfer function).
+// A host's ramps (1-D transfer functions) and color ramps.
 
 #include <array>
 #include <string>
@@ -37,6 +37,33 @@ inline ParsedRamp read_ramp(cumulet_ramp of, const float* points, std::uint64_t 
   }
   accept(settings::ramp_refusal(checked));
   return {targets.at(number(of)), volume::Ramp(std::move(curve))};
+}
+
+struct ParsedColorRamp {
+  volume::ColorRamp viewer::Ramps::*target;
+  volume::ColorRamp ramp;
+};
+
+/// Throws Error(invalid_argument) for an invalid color ramp.
+inline ParsedColorRamp read_color_ramp(cumulet_ramp of, const float* stops, std::uint64_t count) {
+  constexpr std::array targets = {&viewer::Ramps::density_colors, &viewer::Ramps::temperature_colors,
+                                  &viewer::Ramps::flame_colors};
+  static_assert(targets.size() == settings::color_ramps.size());
+  require(number(of) < targets.size(), "ramp is unknown");
+  const settings::ColorRampInfo& info = settings::color_ramps.at(number(of));
+  const auto accept = [&](const std::string& why) {
+    if (!why.empty()) refuse(std::string("the color ramp of ") + info.name + " " + why);
+  };
+  accept(settings::ramp_count_refusal(count));
+  const std::span<const float> given = array_of(stops, count, 4, "stops");
+  settings::ColorStops checked;
+  std::vector<glm::vec4> colors;
+  for (std::size_t i = 0; i < given.size(); i += 4) {
+    checked.push_back({given[i], given[i + 1], given[i + 2], given[i + 3]});
+    colors.emplace_back(given[i], given[i + 1], given[i + 2], given[i + 3]);
+  }
+  accept(settings::color_ramp_refusal(info, checked));
+  return {targets.at(number(of)), volume::ColorRamp(std::move(colors))};
 }
 
 }  // namespace cumulet::c_abi

@@ -22,6 +22,18 @@ float Ramp::operator()(float value) const {
   return static_cast<float>(a.y + (b.y - a.y) * ((double{value} - a.x) / (b.x - a.x)));
 }
 
+glm::vec3 ColorRamp::operator()(float value) const {
+  if (stops_.empty()) return glm::vec3(1.0F);
+  const auto above = std::ranges::upper_bound(stops_, value, {}, &glm::vec4::x);
+  const auto color = [](const glm::vec4& stop) { return glm::vec3(stop.y, stop.z, stop.w); };
+  if (above == stops_.begin()) return color(stops_.front());
+  if (above == stops_.end()) return color(stops_.back());
+  const glm::vec4& a = *(above - 1);
+  const glm::vec4& b = *above;
+  const double along = (double{value} - double{a.x}) / (double{b.x} - double{a.x});
+  return {glm::mix(glm::dvec3(color(a)), glm::dvec3(color(b)), along)};
+}
+
 ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress* progress) {
   ScalarVolume out;
   out.name = volume.name;

@@ -27,6 +27,24 @@ class Ramp {
   std::vector<glm::vec2> points_;
 };
 
+/// A color for each value of a field, linear between its stops and constant beyond them. Without stops it is white.
+class ColorRamp {
+ public:
+  ColorRamp() = default;
+  /// stops: (value, red, green, blue), at least two, with strictly ascending values; all finite, colors not negative.
+  explicit ColorRamp(std::vector<glm::vec4> stops) : stops_(std::move(stops)) {}
+
+  /// Whether all values are white.
+  [[nodiscard]] bool empty() const { return stops_.empty(); }
+  [[nodiscard]] const std::vector<glm::vec4>& stops() const { return stops_; }
+  /// O(log stops).
+  [[nodiscard]] glm::vec3 operator()(float value) const;
+  bool operator==(const ColorRamp&) const = default;
+
+ private:
+  std::vector<glm::vec4> stops_;
+};
+
 /// Applies a ramp to every voxel. O(voxels of bricks) time and memory. Throws Error(cancelled).
 ScalarVolume apply(const Ramp& ramp, const ScalarVolume& volume, const Progress* progress = nullptr);
 

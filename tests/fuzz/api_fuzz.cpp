@@ -542,12 +542,8 @@ class Program : Arguments {
         return warm_up();
       case 22:
         return check(cumulet_use_surface_camera(viewer, input.ConsumeIntegralInRange(0U, 2U)));
-      case 23: {
-        std::array<float, 8> points{};
-        for (float& one : points) one = input.ConsumeFloatingPoint<float>();
-        const auto which = static_cast<cumulet_ramp>(input.ConsumeIntegralInRange(0U, 3U));
-        return check(cumulet_set_ramp(viewer, which, points.data(), input.ConsumeIntegralInRange(0U, 4U)));
-      }
+      case 23:
+        return check(set_ramp(viewer));
       case 24:
         return make_environment();
       case 25:

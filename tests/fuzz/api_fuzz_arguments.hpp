@@ -40,6 +40,16 @@ struct Arguments {
     return desc;
   }
 
+  /// Sets a ramp or a color ramp of arbitrary numbers.
+  cumulet_status set_ramp(cumulet_viewer* viewer) {
+    std::array<float, 8> numbers{};
+    for (float& one : numbers) one = input.ConsumeFloatingPoint<float>();
+    const bool colors = input.ConsumeBool();
+    const auto which = static_cast<cumulet_ramp>(input.ConsumeIntegralInRange(0U, 3U));
+    const auto set = colors ? cumulet_set_color_ramp : cumulet_set_ramp;
+    return set(viewer, which, numbers.data(), input.ConsumeIntegralInRange(0U, colors ? 2U : 4U));
+  }
+
   /// 8 bytes: an integer, a double, two floats or two small integers, some of them unusual.
   std::uint64_t number() {
     const auto one_float = [this] {

@@ -163,9 +163,15 @@ class Pictures(unittest.TestCase):
         self.viewer.set_ramp("density", [(0, 0), (1, 0.5)])
         with self.assertRaises(ValueError):
             self.viewer.set_ramp("density", [(0, 0, 0)])
+        self.viewer.set_color_ramp("density", [(0, 0, 0, 0), (1, 1, 0.5, 0)])
+        with self.assertRaises(ValueError):
+            self.viewer.set_color_ramp("density", [(0, 0, 0), (1, 1, 1)])
+        with self.assertRaises(cumulet.Error):
+            self.viewer.set_color_ramp("density", [(0, 0, 0, 0), (1, 2, 0, 0)])
         brighter = self.viewer.render_picture(SIZE, progress=False)
         self.viewer.set_lights([])
         self.viewer.set_ramp("density", [])
+        self.viewer.set_color_ramp("density", [])
         self.assertNotEqual(brighter.display, self.picture.display)
 
 

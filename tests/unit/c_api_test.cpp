@@ -100,6 +100,48 @@ TEST_F(CApi, InvalidRampsGiveAOneLineError) {
   EXPECT_EQ(cumulet_set_ramp(viewer_, CUMULET_RAMP_TEMPERATURE, nullptr, 0), CUMULET_OK);
 }
 
+TEST_F(CApi, InvalidColorRampsGiveAOneLineError) {
+  using Stops = std::vector<float>;
+  struct Case {
+    cumulet_ramp ramp;
+    Stops stops;
+    const char* cause;
+  };
+  const float nan = std::nanf("");
+  for (const Case& c :
+       {Case{CUMULET_RAMP_FLAME, {1, 2, 3, 4}, "the color ramp of flame has 1 point; it must have 0 or 2 to 32"},
+        Case{CUMULET_RAMP_FLAME, Stops(132, 1.0F), "the color ramp of flame has 33 points; it must have 0 or 2 to 32"},
+        Case{CUMULET_RAMP_TEMPERATURE,
+             {1, 0, 0, 0, 0.5F, 0, 0.25F, 1},
+             "the color ramp of temperature has a point 0.5:0/0.25/1 whose input is not above that of 1:0/0/0"},
+        Case{CUMULET_RAMP_DENSITY,
+             {0, 0, 0, 0, 1, 0.5F, 1.5F, 0},
+             "the color ramp of density has a point 1:0.5/1.5/0 whose color is not from 0 to 1"},
+        Case{CUMULET_RAMP_FLAME,
+             {0, 0, 0, 0, 1, 0.5F, 1.5F, -1},
+             "the color ramp of flame has a point 1:0.5/1.5/-1 whose color is not from 0 to 1e30"},
+        Case{CUMULET_RAMP_FLAME,
+             {0, nan, 0, 0, 1, 0, 0, 0},
+             "the color ramp of flame has a point 0:nan/0/0 whose color is not from 0 to 1e30"},
+        Case{CUMULET_RAMP_FLAME,
+             {nan, 0, 0, 0, 1, 0, 0, 0},
+             "the color ramp of flame has a point nan:0/0/0 whose input is not from -1e30 to 1e30"}}) {
+    EXPECT_EQ(cumulet_set_color_ramp(viewer_, c.ramp, c.stops.data(), c.stops.size() / 4),
+              CUMULET_ERROR_INVALID_ARGUMENT);
+    EXPECT_EQ(error(), c.cause);
+  }
+  EXPECT_EQ(cumulet_set_color_ramp(viewer_, CUMULET_RAMP_FLAME, nullptr, 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(error(), "stops are NULL");
+  const Stops good = {-1, 0, 0, 0, 1, 1, 1, 1};
+  cumulet_ramp unknown{};
+  const int number = 3;
+  std::memcpy(&unknown, &number, sizeof unknown);
+  EXPECT_EQ(cumulet_set_color_ramp(viewer_, unknown, good.data(), 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(error(), "ramp is unknown");
+  EXPECT_EQ(cumulet_set_color_ramp(viewer_, CUMULET_RAMP_DENSITY, good.data(), 2), CUMULET_OK);
+  EXPECT_EQ(cumulet_set_color_ramp(viewer_, CUMULET_RAMP_DENSITY, nullptr, 0), CUMULET_OK);
+}
+
 TEST_F(CApi, ChecksSizesEnumsAndNumbers) {
   auto grid = make_desc<cumulet_grid_desc>();
   EXPECT_EQ(cumulet_set_grid(viewer_, &grid), CUMULET_OK);

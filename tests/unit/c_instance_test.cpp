@@ -85,6 +85,7 @@ TEST_F(CVolumeInstance, InvalidInputGivesAOneLineError) {
   EXPECT_EQ(cumulet_instance_set_to_world(one.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_instance_set_to_world(nullptr, flat.data()), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_instance_set_ramp(one.get(), CUMULET_RAMP_FLAME, nullptr, 2), CUMULET_ERROR_INVALID_ARGUMENT);
+  EXPECT_EQ(cumulet_instance_set_color_ramp(one.get(), CUMULET_RAMP_FLAME, nullptr, 2), CUMULET_ERROR_INVALID_ARGUMENT);
   const ViewerPtr shows = make();
   EXPECT_EQ(cumulet_add_instance(shows.get(), nullptr), CUMULET_ERROR_INVALID_ARGUMENT);
   EXPECT_EQ(cumulet_remove_instance(shows.get(), one.get()), CUMULET_ERROR_INVALID_ARGUMENT);

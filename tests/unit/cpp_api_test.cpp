@@ -99,6 +99,8 @@ TEST(CppInstance, IsSharedByCopies) {
   EXPECT_TRUE(instance.set_to_world(transform).has_value());
   constexpr std::array<std::array<float, 2>, 2> same{{{0.0F, 0.0F}, {1.0F, 1.0F}}};
   EXPECT_TRUE(instance.set_ramp(Ramp::density, same).has_value());
+  constexpr std::array<std::array<float, 4>, 2> gray{{{0.0F, 0.5F, 0.5F, 0.5F}, {1.0F, 1.0F, 1.0F, 1.0F}}};
+  EXPECT_TRUE(instance.set_color_ramp(Ramp::density, gray).has_value());
   EXPECT_TRUE(instance.set({.volume = volume, .medium = {.density_scale = 2.0}, .hidden = true}).has_value());
   EXPECT_FALSE(Instance().set({}).has_value());
 }

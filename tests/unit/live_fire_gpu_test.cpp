@@ -231,6 +231,28 @@ TEST_F(LiveFireOnGpu, EachViewerUsesItsOwnMedium) {
   }
 }
 
+// Shaders do not evaluate color ramps. The fields are read back to main memory, where they are applied.
+TEST_F(LiveFireOnGpu, ColorRampsBringItToMainMemory) {
+  const Fire burning = fire(2);
+  constexpr std::array<float, 8> stops{0.0F, 0.2F, 1.0F, 0.0F, 1.0F, 1.0F, 0.0F, 0.5F};
+  for (const cumulet_ramp ramp : {CUMULET_RAMP_DENSITY, CUMULET_RAMP_TEMPERATURE, CUMULET_RAMP_FLAME}) {
+    SCOPED_TRACE(ramp);
+    SetUp();
+    burn(v_, 2.0F, 1.0F);
+    hand_over(burning.fields);
+    const Picture before = settled(v_);
+    EXPECT_FALSE(shows_voxels());
+    ASSERT_EQ(cumulet_set_color_ramp(v_, ramp, stops.data(), 2), CUMULET_OK);
+    const Picture found = settled(v_);
+    EXPECT_TRUE(shows_voxels());
+    EXPECT_NE(difference(found, before), "");
+    const ViewerPtr other = make(CUMULET_BUILD_GPU);
+    burn(other.get(), 2.0F, 1.0F);
+    ASSERT_EQ(cumulet_set_color_ramp(other.get(), ramp, stops.data(), 2), CUMULET_OK);
+    EXPECT_EQ(difference(found, test::picture_of(other.get(), alone(in_memory(burning)).get(), target_)), "");
+  }
+}
+
 // If GL memory does not suffice for computing the emission, the fields are read back to main memory.
 TEST_F(LiveFireOnGpu, FallsBackToMainMemoryWithoutGpuMemory) {
   const Fire burning = fire(2);

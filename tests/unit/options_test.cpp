@@ -12,6 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "memory.hpp"
@@ -222,6 +223,39 @@ TEST(Options, RampIsAListOfPoints) {
   EXPECT_TRUE(scene.ramps[CUMULET_RAMP_FLAME].empty());
   EXPECT_NE(usage_error(with({"--flame-ramp", "0:0,1"})).find("'1' is not a pair INPUT:OUTPUT"), std::string::npos);
   EXPECT_NE(usage_error(with({"--flame-ramp", "1:0,0:1"})).find("has a point 0:1 whose input is not above that of 1:0"),
+            std::string::npos);
+}
+
+// Colors are sRGB as "#rrggbb", or three linear numbers, which may be above 1 for what emits.
+TEST(Options, ColorRampIsAListOfColors) {
+  using Stops = cumulet::settings::ColorStops;
+  const SceneOptions scene = parse({"--density-color-ramp", "0:#000000,0.5:1/0.5/.25,2:#FFffff",
+                                    "--temperature-color-ramp", "-1:0/0/0,1:20/4/1e-1", "--flame-color-ramp", "none"})
+                                 .scene;
+  EXPECT_EQ(scene.color_ramps[CUMULET_RAMP_DENSITY],
+            (Stops{{0.0f, 0.0f, 0.0f, 0.0f}, {0.5f, 1.0f, 0.5f, 0.25f}, {2.0f, 1.0f, 1.0f, 1.0f}}));
+  EXPECT_EQ(scene.color_ramps[CUMULET_RAMP_TEMPERATURE], (Stops{{-1.0f, 0.0f, 0.0f, 0.0f}, {1.0f, 20.0f, 4.0f, 0.1f}}));
+  EXPECT_TRUE(scene.color_ramps[CUMULET_RAMP_FLAME].empty());
+  const SceneOptions gray = parse({"--flame-color-ramp", "0:#bc8000,1:#000000"}).scene;
+  EXPECT_NEAR(gray.color_ramps[CUMULET_RAMP_FLAME][0][1], 0.5f, 3e-3f) << "sRGB 188 is half the light";
+  EXPECT_NEAR(gray.color_ramps[CUMULET_RAMP_FLAME][0][2], 0.2159f, 1e-3f);
+  for (const auto& [flag, text] : {std::pair{"--density-color-ramp", ""},
+                                   {"--density-color-ramp", "0:#ff8000"},
+                                   {"--density-color-ramp", "0:#ff8000,1:#ff80"},
+                                   {"--density-color-ramp", "0:#ff8000,1:#ff80xx"},
+                                   {"--density-color-ramp", "0:#ff8000,1:1/0.5"},
+                                   {"--flame-color-ramp", "0:#ff8000,0:#ff8000"},
+                                   {"--temperature-color-ramp", "0:#000000,1:1/-1/0"}}) {
+    const std::string error = usage_error(with({flag, text}));
+    EXPECT_EQ(error.rfind(std::string(flag) + ": ", 0), 0u) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+  }
+  EXPECT_NE(usage_error(with({"--flame-color-ramp", "0:#000000,1"})).find("'1' is not a pair INPUT:COLOR"),
+            std::string::npos);
+  EXPECT_NE(usage_error(with({"--flame-color-ramp", "0:#000000,1:red"})).find("'red' is not a color"),
+            std::string::npos);
+  EXPECT_NE(usage_error(with({"--density-color-ramp", "0:#000000,1:0/2/0"}))
+                .find("has a point 1:0/2/0 whose color is not from 0 to 1"),
             std::string::npos);
 }
 

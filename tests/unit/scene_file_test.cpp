@@ -49,6 +49,8 @@ SceneOptions full_scene() {
   scene.medium.max_bounces = 4294967295u;
   scene.ramps[CUMULET_RAMP_DENSITY] = {{-0.5f, 0.0f}, {0.1f, 1e30f}, {3.0f, 1.0f / 3.0f}};
   scene.ramps[CUMULET_RAMP_FLAME] = {{0.0f, 2.0f}, {1.0f, 0.0f}};
+  scene.color_ramps[CUMULET_RAMP_DENSITY] = {{-0.5f, 0.0f, 1.0f / 3.0f, 1.0f}, {0.1f, 1.0f, 0.0f, 1e-9f}};
+  scene.color_ramps[CUMULET_RAMP_TEMPERATURE] = {{0.0f, 0.0f, 0.0f, 0.0f}, {3.0f, 1e30f, 2.0f, 0.1f}};
   for (int i = 0; i < 3; ++i) scene.medium.emission[i] = 3.3f * static_cast<float>(i);
   scene.light.sun_azimuth_degrees = -123.4f;
   scene.light.sun_elevation_degrees = -5.6f;
@@ -104,6 +106,7 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.camera, scene.camera));
   EXPECT_TRUE(same(read.medium, scene.medium));
   EXPECT_EQ(read.ramps, scene.ramps);
+  EXPECT_EQ(read.color_ramps, scene.color_ramps);
   EXPECT_TRUE(same(read.light, scene.light));
   EXPECT_TRUE(std::ranges::equal(read.analytic_lights, scene.analytic_lights, same<cumulet_light_desc>));
   EXPECT_EQ(read.to_world, scene.to_world);
@@ -139,6 +142,7 @@ TEST(SceneFile, SupportsAnyNumberOfVolumes) {
   smoke.medium.anisotropy = 0.3f;
   smoke.transforms.assign(3, scene.to_world);
   smoke.ramps[CUMULET_RAMP_DENSITY] = {{0.0f, 0.0f}, {1.0f, 2.0f}};
+  smoke.color_ramps[CUMULET_RAMP_FLAME] = {{0.0f, 0.0f, 1.0f, 2.0f}, {1.0f, 2.0f, 1.0f, 0.0f}};
   SceneVolume& fire = scene.others.emplace_back();
   fire.volume = "/elsewhere/fire.vdb";
   fire.flame_grid = "none";
@@ -162,6 +166,7 @@ TEST(SceneFile, SupportsAnyNumberOfVolumes) {
     EXPECT_EQ(a.visible, b.visible);
     EXPECT_EQ(a.transforms, b.transforms);
     EXPECT_EQ(a.ramps, b.ramps);
+    EXPECT_EQ(a.color_ramps, b.color_ramps);
     EXPECT_EQ(a.auto_density_scale, b.auto_density_scale);
     EXPECT_EQ(a.medium.density_scale, b.medium.density_scale);
     EXPECT_EQ(a.medium.anisotropy, b.medium.anisotropy);
@@ -213,6 +218,9 @@ TEST(SceneFile, EveryDifferenceIsDetected) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.transforms.pop_back(); }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.ramps[CUMULET_RAMP_DENSITY][1][0] = 0.2f; }));
   EXPECT_TRUE(differs([](SceneOptions& s) { s.ramps[CUMULET_RAMP_FLAME].clear(); }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.color_ramps[CUMULET_RAMP_DENSITY][1][2] = 0.5f; }));
+  EXPECT_TRUE(differs(
+      [](SceneOptions& s) { std::swap(s.color_ramps[CUMULET_RAMP_FLAME], s.color_ramps[CUMULET_RAMP_TEMPERATURE]); }));
   EXPECT_TRUE(
       differs([](SceneOptions& s) { std::swap(s.ramps[CUMULET_RAMP_FLAME], s.ramps[CUMULET_RAMP_TEMPERATURE]); }));
   EXPECT_FALSE(differs([](SceneOptions&) {}));
@@ -349,6 +357,15 @@ TEST(SceneFile, ErrorsNameTheFileTheKeyAndTheCause) {
              "medium.temperature_ramp: has a point 1:-1 whose output is not from 0 to 1e30"},
         Case{R"("medium": {"temperature_ramp": [[0, 1], [1e300, 1]]})",
              "medium.temperature_ramp: has a point inf:1 whose input is not from -1e30 to 1e30"},
+        Case{R"("medium": {"density_color_ramp": {}})", "medium.density_color_ramp: is not a list of points"},
+        Case{R"("medium": {"flame_color_ramp": [[0, 0, 0, 1], [1, 1]]})",
+             "medium.flame_color_ramp: has a point that is not four numbers"},
+        Case{R"("medium": {"flame_color_ramp": [[0, 0, 0, 1], [1, 1, "1", 1]]})",
+             "medium.flame_color_ramp: is not a number"},
+        Case{R"("medium": {"temperature_color_ramp": [[0, 0, 0, 1]]})",
+             "medium.temperature_color_ramp: has 1 point; it must have 0 or 2"},
+        Case{R"("medium": {"density_color_ramp": [[0, 0, 0, 1], [1, 1, 2, 1]]})",
+             "medium.density_color_ramp: has a point 1:1/2/1 whose color is not from 0 to 1"},
         Case{R"("volume": {"file": 3})", "volume.file"},
         Case{R"("volume": {"file": "a\u0000b"})", "volume.file"}}) {
     const std::string error = error_of(with(c.section));

@@ -250,6 +250,7 @@ TEST(Settings, DocumentationListsExactlyTheKeys) {
     });
   });
   for (const settings::RampInfo& ramp : settings::ramps) keys.insert(ramp.key);
+  for (const settings::ColorRampInfo& ramp : settings::color_ramps) keys.insert(ramp.key);
   EXPECT_EQ(documented, keys);
 }
 

@@ -2385,7 +2385,7 @@ typedef struct cumulet_medium_desc {
   int32_t holdout;
 } cumulet_medium_desc;
 
-/** The grid whose values a ramp changes. */
+/** The grid whose values a ramp or a color ramp maps. */
 typedef enum cumulet_ramp {
   CUMULET_RAMP_DENSITY = 0,
   CUMULET_RAMP_TEMPERATURE = 1,
@@ -2632,6 +2632,38 @@ CUMULET_API cumulet_status cumulet_set_medium(cumulet_viewer* viewer, const cumu
  */
 CUMULET_API cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* points,
                                             uint64_t count);
+/**
+ * Sets a color ramp over the values of a grid, for every volume that the viewer shows as its own: the color at each
+ * value, as Blender's Color Ramp. cumulet_set_ramp changes how strongly values scatter and emit, and a color ramp
+ * changes the color. A change rebuilds the grid in the background.
+ *
+ * A color ramp is linear between its stops and constant beyond the first and the last. Its input is the value of the
+ * grid, before cumulet_set_ramp, so that each value keeps its color when that ramp changes. Colors are linear Rec. 709.
+ *
+ * - density: the color multiplies the albedo and the color grid of the file, (1 - coalbedo) x color_ramp(density) x
+ *   color grid. The extinction does not depend on it.
+ * - temperature: the color replaces that of the black body,
+ *
+ *       1e-6 sigma / pi x mix(1, T^4, blackbody) x blackbody_tint x color_ramp(temperature)
+ *
+ *   A color of luminance 1 is as bright as the black body. Nothing is emitted below 100 K, where ramp(temperature) is
+ *   0, or with a blackbody of 0.
+ * - flame: the color replaces flame_color, flame_strength x ramp(flame) x color_ramp(flame).
+ *
+ * Color ramps are applied per voxel, after resampling to the density's voxels, and are exact for every grid type. A
+ * GPU-resident dynamic volume that has one moves to main memory, as with a ramp of density.
+ *
+ * Threads: any thread. No GL.
+ *
+ * @param viewer The viewer.
+ * @param ramp   The grid.
+ * @param stops  count groups x, r, g, b: x strictly ascending and within 1e30; r, g and b from 0 to 1 for the density,
+ *               and from 0 to 1e30 for the others. Copied.
+ * @param count  2 to 32 groups. 0, the default: no color ramp.
+ * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
+ */
+CUMULET_API cumulet_status cumulet_set_color_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* stops,
+                                                  uint64_t count);
 /** Histogram of a volume's grid, before its ramp: for a panel that draws the ramp over it. */
 typedef struct cumulet_histogram_info {
   size_t struct_size;
@@ -2768,6 +2800,19 @@ CUMULET_API cumulet_status cumulet_instance_set_to_world(cumulet_instance* insta
  */
 CUMULET_API cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance, cumulet_ramp ramp, const float* points,
                                                      uint64_t count);
+/**
+ * Sets a color ramp for this instance only, with the rules of cumulet_set_color_ramp.
+ *
+ * Threads: any thread; runs update callbacks of viewers that show the instance. No GL.
+ *
+ * @param instance The instance.
+ * @param ramp     The grid.
+ * @param stops    count groups x, r, g, b as for cumulet_set_color_ramp. Copied.
+ * @param count    2 to 32 groups. 0, the default: no color ramp.
+ * @return CUMULET_OK or CUMULET_ERROR_INVALID_ARGUMENT.
+ */
+CUMULET_API cumulet_status cumulet_instance_set_color_ramp(cumulet_instance* instance, cumulet_ramp ramp,
+                                                           const float* stops, uint64_t count);
 /**
  * Shows an instance in a viewer, and follows its changes.
  *

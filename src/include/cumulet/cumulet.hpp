@@ -993,6 +993,11 @@ class Instance {
     const float* first = points.empty() ? nullptr : points.front().data();
     return detail::result(cumulet_instance_set_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, points.size()));
   }
+  [[nodiscard]] Result<> set_color_ramp(Ramp ramp, std::span<const std::array<float, 4>> stops) const noexcept {
+    const float* first = stops.empty() ? nullptr : stops.front().data();
+    return detail::result(
+        cumulet_instance_set_color_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, stops.size()));
+  }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
   /// Returns the handle, which this object still owns.
@@ -1502,6 +1507,11 @@ class Viewer {
   [[nodiscard]] Result<> set_ramp(Ramp ramp, std::span<const std::array<float, 2>> points) noexcept {
     const float* first = points.empty() ? nullptr : points.front().data();
     return result(cumulet_set_ramp(handle(), static_cast<cumulet_ramp>(ramp), first, points.size()));
+  }
+  /// Sets a color ramp from stops of value, red, green and blue; an empty span removes it.
+  [[nodiscard]] Result<> set_color_ramp(Ramp ramp, std::span<const std::array<float, 4>> stops) noexcept {
+    const float* first = stops.empty() ? nullptr : stops.front().data();
+    return result(cumulet_set_color_ramp(handle(), static_cast<cumulet_ramp>(ramp), first, stops.size()));
   }
   [[nodiscard]] Result<> load_surfaces(const std::string& path) noexcept {
     return result(cumulet_load_surfaces(handle(), path.c_str()));

@@ -40,6 +40,14 @@ TEST_F(CppViewer, ReadsWithoutWaiting) {
   EXPECT_TRUE(viewer.cancel_read(viewer.begin_read({.source = ReadSource::aov, .aov = Aov::error}).value()));
 }
 
+TEST_F(CppViewer, SetsColorRamps) {
+  Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();
+  viewer.set_color_ramp(Ramp::density, std::to_array<std::array<float, 4>>({{0, 0, 0, 0}, {1, 1, 1, 1}})).value();
+  viewer.set_color_ramp(Ramp::density, {}).value();
+  EXPECT_EQ(viewer.set_color_ramp(Ramp::flame, std::to_array<std::array<float, 4>>({{0, 0, 0, 0}})).error().status,
+            StatusCode::invalid_argument);
+}
+
 TEST_F(CppViewer, ShowsAVolume) {
   const BallFile file;
   Viewer viewer = Viewer::create({.get_proc = get_proc()}).value();

@@ -51,6 +51,15 @@ std::string text_of(const volume::Ramp& ramp) {
   return "{" + text + "}";
 }
 
+std::string text_of(const volume::ColorRamp& ramp) {
+  std::string text;
+  for (const glm::vec4& stop : ramp.stops()) {
+    text += text.empty() ? "" : ", ";
+    text += text_of(stop.x) + ": " + text_of(dvec3(stop.y, stop.z, stop.w));
+  }
+  return "{" + text + "}";
+}
+
 std::string text_of(const scene::Phase& phase) {
   if (phase == scene::Phase{}) return "isotropic";
   return "phase " + text_of(phase.anisotropy) + " " + text_of(phase.second_anisotropy) + " " +
@@ -69,7 +78,9 @@ std::string text_of(const scene::Emission& e) {
                  e.temperature_scale ? text_of(*e.temperature_scale) : "auto", text_of(e.temperature_offset),
                  "black body", text_of(e.blackbody), text_of(dvec3(e.blackbody_tint)),
                  e.temperature_ramp.empty() ? "" : "temperature ramp " + text_of(e.temperature_ramp),
-                 e.flame_ramp.empty() ? "" : "flame ramp " + text_of(e.flame_ramp)});
+                 e.flame_ramp.empty() ? "" : "flame ramp " + text_of(e.flame_ramp),
+                 e.temperature_colors.empty() ? "" : "temperature colors " + text_of(e.temperature_colors),
+                 e.flame_colors.empty() ? "" : "flame colors " + text_of(e.flame_colors)});
 }
 
 std::string text_of(const scene::ShutterTransforms& ends) {
@@ -281,6 +292,7 @@ std::string StageText::settings(const viewer::BuildSettings& s) {
   const bool is_tet = s.march == scene::March::tet;
   return joined({name_of(s.march), if_set(is_tet && s.on == viewer::BuildOn::gpu, "by the GPU"), text_of(s.refine),
                  s.density_ramp.empty() ? "" : "ramp " + text_of(s.density_ramp),
+                 s.density_colors.empty() ? "" : "colors " + text_of(s.density_colors),
                  s.emission == scene::Emission{} ? "" : text_of(s.emission), if_set(!s.anisotropic, "no anisotropy"),
                  s.shutter_seconds == 0.0 ? "" : "shutter " + text_of(s.shutter_seconds)});
 }
