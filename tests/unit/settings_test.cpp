@@ -242,6 +242,10 @@ TEST(Settings, DocumentationListsExactlyTheKeys) {
                                 "picture.height",
                                 "picture.light_groups",
                                 "environment.file",
+                                "display.ocio.config",
+                                "display.ocio.display",
+                                "display.ocio.view",
+                                "display.ocio.input",
                                 "sequence.first_frame",
                                 "sequence.last_frame",
                                 "sequence.frame"};
