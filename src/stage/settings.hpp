@@ -44,8 +44,10 @@ struct GridSettings {
     s.build.on = static_cast<BuildOn>(d.build_device);
     s.build.interpolation =
         d.interpolation == CUMULET_INTERPOLATION_NEAREST ? grid::Interpolation::nearest : grid::Interpolation::linear;
-    // Linear interpolation alone would bring them to main memory.
-    const bool may_stay_in_gl = s.build.march == scene::March::tet && s.build.on == BuildOn::gpu;
+    // Linear interpolation alone would bring them to main memory. Trilinear cells need it, and grids with other cells
+    // cannot be shown beside them.
+    const bool may_stay_in_gl =
+        s.build.march == scene::March::tet && s.build.on == BuildOn::gpu && d.cells != CUMULET_CELLS_TRILINEAR;
     const bool automatic = d.interpolation == CUMULET_INTERPOLATION_AUTO;
     s.interpolation_in_gl = automatic && may_stay_in_gl ? grid::Interpolation::nearest : s.build.interpolation;
     grid::RefineSettings& refine = s.build.refine;

@@ -224,10 +224,15 @@ BuildSettings VolumeStage::settings_for_view() const {
 
 grid::Interpolation VolumeStage::interpolation_of(const Live& live) {
   if (live.values_wanted() == nullptr) return grid_.build.interpolation;
-  if (grid_.interpolation_in_gl != grid_.build.interpolation && !std::exchange(remarked_interpolation_, true))
+  const bool is_linear = grid_.interpolation_in_gl == grid_.build.interpolation;
+  const bool is_trilinear = grid_.build.refine.cells == grid::CellKind::trilinear;
+  if ((!is_linear || is_trilinear) && !std::exchange(remarked_interpolation_, true))
     log_.info(
-        "GPU-resident dynamic volumes are built without interpolation between voxels, because linear interpolation "
-        "needs the voxels in main memory");
+        is_linear
+            ? "GPU-resident dynamic volumes are copied to main memory, because trilinear cells need interpolation "
+              "between voxels"
+            : "GPU-resident dynamic volumes are built without interpolation between voxels, because linear "
+              "interpolation needs the voxels in main memory");
   return grid_.interpolation_in_gl;
 }
 

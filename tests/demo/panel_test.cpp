@@ -70,9 +70,9 @@ class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
 
   void check_controls() {
     const auto& controls = panel_.ui().controls();
-    const std::set<std::string> without_tip = {"File",      "Edit",     "View",       "Render",       "Help",
-                                               "Image",     "Sampling", "Advanced",   "Model",        "Triangles",
-                                               "Grid data", "Levels",   "Cell count", "Active voxels"};
+    const std::set<std::string> without_tip = {"File",      "Edit",     "View",       "Render",        "Help",
+                                               "Image",     "Sampling", "Advanced",   "Model",         "Triangles",
+                                               "Grid data", "Levels",   "Cell count", "Active voxels", "OpenColorIO"};
     EXPECT_GT(controls.size(), 20u);
     const ImVec2 screen = ImGui::GetIO().DisplaySize;
     for (const auto& [name, control] : controls) {

@@ -224,6 +224,33 @@ TEST_F(LiveStatesOnGpu, DefaultInterpolationLeavesVoxelsOnTheGpu) {
   EXPECT_EQ(notes, 1);
 }
 
+// Trilinear cells need interpolation, and all cells of a scene are of one kind.
+TEST_F(LiveStatesOnGpu, TrilinearCellsShowItBesideAnotherVolume) {
+  const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
+  const test::VolumeRef own = alone(dense(odd, array.values));
+  const test::VolumeRef second = alone(dense(odd, simulated(CUMULET_CHANNEL_DENSITY, odd, 5)));
+  auto beside = make_desc<cumulet_instance_desc>();
+  beside.volume = second.get();
+  for (const int i : {0, 5, 10, 15}) beside.to_world[i] = 1.0;
+  beside.to_world[12] = 4.0;
+  const test::InstanceRef instance = test::make_instance(beside);
+  auto grid = make_desc<cumulet_grid_desc>();
+  grid.build_device = CUMULET_BUILD_GPU;
+  grid.cells = CUMULET_CELLS_TRILINEAR;
+  const auto prepare = [&](cumulet_viewer* viewer) {
+    EXPECT_EQ(cumulet_set_grid(viewer, &grid), CUMULET_OK);
+    EXPECT_EQ(cumulet_add_instance(viewer, instance.get()), CUMULET_OK);
+  };
+  const ViewerPtr other = make(CUMULET_BUILD_GPU);
+  prepare(other.get());
+  const Picture expected = test::picture_of(other.get(), own.get(), target_);
+  prepare(v_);
+  hand_over_density(array, voxel_types[1]);
+  arrive();
+  EXPECT_EQ(difference(picture(), expected), "");
+  EXPECT_EQ(interpolation_in_use(v_), CUMULET_INTERPOLATION_LINEAR);
+}
+
 TEST_F(LiveStatesOnGpu, DefaultInterpolationOfAnInstanceLeavesVoxelsOnTheGpu) {
   const Array array(CUMULET_VOXEL_FORMAT_R16F, simulated(CUMULET_CHANNEL_DENSITY, odd, 1));
   ASSERT_EQ(cumulet_set_dynamic_volume(v_, nullptr), CUMULET_OK);

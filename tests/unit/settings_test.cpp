@@ -170,6 +170,10 @@ TEST(Settings, InterpolationIsLinearByDefaultWhereVoxelsAreInMainMemory) {
         expect(CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_GPU);
         continue;
       }
+      // All cells of a scene are of one kind, and trilinear ones need interpolation.
+      grid.cells = CUMULET_CELLS_TRILINEAR;
+      expect(CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_GPU);
+      grid.cells = CUMULET_CELLS_LINEAR;
       expect(CUMULET_GRID_TETRAHEDRAL, CUMULET_BUILD_CPU);
       expect(CUMULET_GRID_DENSE, CUMULET_BUILD_GPU);
       expect(CUMULET_GRID_BRICKS, CUMULET_BUILD_CPU);
@@ -238,6 +242,10 @@ TEST(Settings, DocumentationListsExactlyTheKeys) {
                                 "picture.height",
                                 "picture.light_groups",
                                 "environment.file",
+                                "display.ocio.config",
+                                "display.ocio.display",
+                                "display.ocio.view",
+                                "display.ocio.input",
                                 "sequence.first_frame",
                                 "sequence.last_frame",
                                 "sequence.frame"};

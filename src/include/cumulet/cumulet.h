@@ -2248,7 +2248,7 @@ typedef enum cumulet_cell_density {
 typedef enum cumulet_interpolation {
   /**
    * The library's default: linear. There is one exception: nearest for dynamic volumes with
-   * cumulet_dynamic_volume_desc.gpu_resident, if the grid is tetrahedral and the GPU builds it, because linear would
+   * cumulet_dynamic_volume_desc.gpu_resident, if the GPU builds tetrahedra whose cells are not trilinear: linear would
    * need their voxels in main memory. Then the log says so once. cumulet_get_interpolation returns which is in use.
    */
   CUMULET_INTERPOLATION_AUTO = 0,
