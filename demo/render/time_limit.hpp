@@ -28,7 +28,7 @@ class TimeLimit {
 /// Returns the seconds for the samples of an image that is to be denoised and written `whole` seconds after the start,
 /// `over` seconds after it. A slow start does not take them all, because a file manager keeps a thumbnail.
 [[nodiscard]] constexpr double sampling_seconds(double whole, double over) {
-  constexpr double least = 0.6, most = 1.5;
+  constexpr double least = 0.9, most = 1.5;
   constexpr double denoising = 0.7;  // of the time for samples: two feature rays per sample
   return std::clamp((whole - over) / (1.0 + denoising), least, most);
 }

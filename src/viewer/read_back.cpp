@@ -37,10 +37,13 @@ static_assert(std::ranges::equal(
     settings::aovs, render::aov_values, {}, [](const settings::Aov& aov) { return aov.channels.size(); },
     &render::AovValues::count));
 
-// With few samples per pixel, more feature rays would take longer than more samples, for less benefit.
-std::uint32_t rays_to_denoise(const render::Picture& picture) {
+// The filter's guides need not be better than its samples, and rays would take longer than more samples, for less
+// benefit. A network expects guides without noise.
+std::uint32_t rays_to_denoise(const render::Picture& picture, bool by_network) {
+  constexpr std::uint32_t min_filter_rays = 4;
+  const std::uint32_t least = by_network ? render::feature_rays : min_filter_rays;
   return static_cast<std::uint32_t>(
-      std::clamp<std::uint64_t>(2 * picture.samples_per_pixel(), render::feature_rays, render::max_feature_rays));
+      std::clamp<std::uint64_t>(2 * picture.samples_per_pixel(), least, render::max_feature_rays));
 }
 
 std::size_t pixels_of(const render::Picture& picture) { return std::size_t{picture.size().x} * picture.size().y; }
@@ -278,7 +281,7 @@ void Context::read_denoised(const Shot& shot, const Denoisers& by, float* rgba, 
     throw Error(ErrorCode::unsupported, "only shaded images with path-traced surfaces can be denoised");
   }
   require_floats(rgba, count, pixels_of(picture) * 4);
-  find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture));
+  find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture, network != nullptr));
   const render::Display display = shot.display.shown(false);
   const gl::Object denoised = by.any() ? by_network(shot, picture, by) : filtered(picture, display.shows_background());
   const glm::uvec2 size = picture.size();

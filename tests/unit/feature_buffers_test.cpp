@@ -113,4 +113,26 @@ TEST_P(FeatureBuffers, MotionIsTheSameWithDenoiserFeatures) {
   }
 }
 
+// The filter takes few feature rays for an image of few samples. An AOV that is read afterwards has all its rays.
+TEST_P(FeatureBuffers, AnAovIsTheSameAfterDenoisingFewSamples) {
+  const VolumeRef ball = make_ball(8);
+  ASSERT_EQ(cumulet_set_volume(v_, ball.get()), CUMULET_OK);
+  auto sampling = make_desc<cumulet_sampling_desc>();
+  sampling.samples = 1;
+  sampling.preview = CUMULET_PREVIEW_OFF;
+  const auto start_image = [&](std::uint32_t seed) {
+    sampling.seed = seed;
+    ASSERT_EQ(cumulet_set_sampling(v_, &sampling), CUMULET_OK);
+    make();
+  };
+  start_image(0);
+  const std::vector<float> first = aov(CUMULET_AOV_TRANSMITTANCE, 1);
+  start_image(1);
+  start_image(0);
+  const auto denoise = make_desc<cumulet_denoise_desc>();
+  std::vector<float> rgba(count * 4);
+  ASSERT_EQ(cumulet_read_denoised(v_, &denoise, rgba.data(), rgba.size()), CUMULET_OK) << cumulet_last_error(v_);
+  EXPECT_EQ(aov(CUMULET_AOV_TRANSMITTANCE, 1), first);
+}
+
 }  // namespace
