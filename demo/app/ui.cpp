@@ -69,6 +69,7 @@ void Ui::begin(float scale, double time) {
   drawn_.clear();
   if (!hovered_now_) hovered_.clear();
   hovered_now_ = false;
+  takes_delete_ = false;
 }
 
 std::optional<Rectangle> Ui::find(const std::string& label) const {
