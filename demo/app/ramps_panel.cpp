@@ -95,13 +95,13 @@ void Panel::color_ramp(Model& model, std::size_t index) {
                view);
   settings::ColorStop& stop = stops[view.chosen];
   double value[1] = {static_cast<double>(stop[0])};
-  if (ui_.numbers(label_of(info.name, " stop").c_str(), "Grid value of the selected stop.", value,
+  if (ui_.numbers((std::string("Stop##") + info.label).c_str(), "Grid value of the selected stop.", value,
                   0.005f * (view.max_value - view.min_value)))
     move_stop(stops, view.chosen, static_cast<float>(value[0]));
   // Emission may be brighter than a color field can show. Its brightness stays.
   const float peak = std::max({1.0f, stop[1], stop[2], stop[3]});
   float color[3] = {stop[1] / peak, stop[2] / peak, stop[3] / peak};
-  if (ui_.color(label_of(info.name, " stop color").c_str(), "Color of the selected stop.", color))
+  if (ui_.color((std::string("Stop color##") + info.label).c_str(), "Color of the selected stop.", color))
     for (std::size_t i = 0; i < 3; ++i) stop[i + 1] = peak * color[i];
 }
 
@@ -112,7 +112,8 @@ void Panel::choose_colors(Model& model, std::size_t index) {
   for (const ColorRampPreset& preset : color_ramp_presets())
     choices.push_back({preset.label, static_cast<int>(choices.size()), preset.tip});
   int chosen = -1;
-  if (ui_.choose(label_of(info.name, " palette").c_str(), "Replaces the colors by common ones.", choices, chosen))
+  if (ui_.choose((std::string("Palette##") + info.label).c_str(), "Replaces the colors by common ones.", choices,
+                 chosen))
     stops = stops_of(color_ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(model.status.fields[index]));
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const std::string id = std::string("##") + info.label;

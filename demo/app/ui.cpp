@@ -132,7 +132,7 @@ void Ui::heading(const char* text) {
 
 void Ui::begin_row(const char* label) const {
   ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(label);
+  ImGui::TextUnformatted(label, ImGui::FindRenderedTextEnd(label));
   ImGui::SameLine(px(132.0f));
   ImGui::SetNextItemWidth(-1.0f);
 }

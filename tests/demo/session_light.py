@@ -265,8 +265,8 @@ def test_color_ramps(s):
     removes a stop, each as one step. The Delete key removes the selected stop and not the volume."""
     there = ["frames 2", "wait loaded", "wait converged", "frames 2"]
     bar = '"Flame colors bar"'
-    s.play("replay", [*there, *shot("plain"), 'click "Temperature colors"', *there, 'click "Temperature palette"', "frames 2",
-                      'click "Temperature palette/Gas"', *there, 'click "Copy##Temperature colors"', "frames 2",
+    s.play("replay", [*there, *shot("plain"), 'click "Temperature colors"', *there, 'click "Palette##Temperature colors"', "frames 2",
+                      'click "Palette##Temperature colors/Gas"', *there, 'click "Copy##Temperature colors"', "frames 2",
                       'click "Flame colors"', *there, 'report "first.json"', 'click "Paste##Flame colors"', *there, *shot("pasted"),
                       f"click {bar} 0.5 0.5 right", *there, 'report "removed.json"', f"click {bar} 0.3 0.3", "key delete", *there,
                       'report "deleted.json"', "key ctrl+z", *there, 'report "undone.json"'],
