@@ -238,6 +238,8 @@ void App::handle_key(const Event& event) {
     const bool presses = event.code == GLFW_KEY_SPACE && io.NavVisible;
     // Fly mode uses the tool keys itself.
     const bool flies = command && command->action == Action::tool && model_.navigation.fly != 0;
+    const bool removes_stop = event.code == GLFW_KEY_DELETE && panel_.ui().takes_delete();
+    if (removes_stop) return;
     if (command && !presses && !flies && !(escape && ImGui::IsAnyItemActive())) {
       execute(*command);
       return;

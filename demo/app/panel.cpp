@@ -262,14 +262,16 @@ void Panel::variant(Model& model) {
 namespace {
 
 /// Returns true if the setting has an effect: the phase function has it, and the volume has the grid that it scales.
+/// flame_colors: a color ramp replaces the color of flames.
 template <class Setting>
-bool acts(const Setting& setting, const cumulet_medium_desc& medium, const Status& status) {
+bool acts(const Setting& setting, const cumulet_medium_desc& medium, const Status& status, bool flame_colors) {
   using Desc = cumulet_medium_desc;
   if (setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight))
     return medium.phase == CUMULET_PHASE_TWO_LOBE;
   if (setting.is(&Desc::droplet_diameter)) return medium.phase == CUMULET_PHASE_MIE;
   if (setting.is(&Desc::anisotropy)) return medium.phase != CUMULET_PHASE_MIE;
   const auto has = [&](cumulet_ramp grid) { return status.fields[static_cast<std::size_t>(grid)].most > 0.0f; };
+  if (setting.is(&Desc::flame_color) && flame_colors) return false;
   if (setting.is(&Desc::flame_strength) || setting.is(&Desc::flame_color)) return has(CUMULET_RAMP_FLAME);
   const bool of_heat = setting.is(&Desc::temperature_scale) || setting.is(&Desc::temperature_offset) ||
                        setting.is(&Desc::blackbody) || setting.is(&Desc::blackbody_tint);
@@ -289,7 +291,7 @@ void Panel::medium(Model& model, std::vector<Command>& commands) {
   if (ui_.choose("Preset", "Preset of the medium; does not change the density scale and the ramps.", presets, chosen))
     apply(static_cast<Preset>(chosen), medium);
   settings::for_each<Desc>([&](const auto& setting) {
-    if (!acts(setting, medium, model.status)) return;
+    if (!acts(setting, medium, model.status, !model.scene.color_ramps[CUMULET_RAMP_FLAME].empty())) return;
     rows_.draw(setting, medium.*setting.field);
     if (setting.is(&Desc::density_scale) && model.status.has_volume &&
         ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f}))

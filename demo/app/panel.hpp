@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "color_ramp_edit.hpp"
 #include "file_dialog.hpp"
 #include "grid_picker.hpp"
 #include "model.hpp"
@@ -73,6 +74,10 @@ class Panel {
   void ramps(Model& model);
   // Draws the presets of a ramp, and the buttons that copy and paste it.
   void shape_ramp(Model& model, std::size_t index);
+  // Draws a color ramp, if the volume has its grid.
+  void color_ramp(Model& model, std::size_t index);
+  // Draws the presets of a color ramp, and the buttons that copy and paste it.
+  void choose_colors(Model& model, std::size_t index);
   void surfaces(Model& model);
   void variant(Model& model);
   void grid(Model& model);
@@ -99,6 +104,7 @@ class Panel {
   Rows rows_{ui_};
   Outliner outliner_{ui_};
   std::array<RampView, settings::ramps.size()> ramp_views_;
+  std::array<ColorRampView, settings::color_ramps.size()> color_ramp_views_;
   FileDialog dialog_;
   GridPicker picker_;
   RenderDialog render_dialog_;

@@ -13,6 +13,21 @@
 
 namespace cumulet::demo {
 
+namespace {
+
+// Returns the name of a grid at the beginning of a label, with a text behind it.
+std::string label_of(const char* grid, const char* rest) {
+  std::string label = std::string(grid) + rest;
+  label.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(label.front())));
+  return label;
+}
+
+float reach_of(const FieldValues& field) {
+  return field.most > 0.0f ? std::min(field.most, settings::max_ramp_value) : 1.0f;
+}
+
+}  // namespace
+
 void Panel::ramps(Model& model) {
   for (std::size_t i = 0; i < model.scene.ramps.size(); ++i) {
     const settings::RampInfo& info = settings::ramps[i];
@@ -21,35 +36,33 @@ void Panel::ramps(Model& model) {
     RampView& view = ramp_views_[i];
     bool on = !points.empty();
     if (ui_.checkbox(info.label, info.tip, on)) {
-      const float most = field.most > 0.0f ? std::min(field.most, settings::max_ramp_value) : 1.0f;
+      const float most = reach_of(field);
       points.clear();
       if (on) points = {{0.0f, 0.0f}, {most, most}};
     }
     fit(view, points, field.most);
-    if (points.empty()) continue;
-    shape_ramp(model, i);
-    ui_.curve((std::string(info.label) + " curve").c_str(),
-              "Drag to move a point. Click to add one. Right-click removes it.", points, view, field.heights,
-              field.most);
-    double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
-    if (ui_.numbers(info.point, "Input and output value of the selected point.", chosen, 0.005f * view.max_value))
-      move_point(points, view.chosen, {static_cast<float>(chosen[0]), static_cast<float>(chosen[1])});
+    if (!points.empty()) {
+      shape_ramp(model, i);
+      ui_.curve((std::string(info.label) + " curve").c_str(),
+                "Drag to move a point. Click to add one. Right-click removes it.", points, view, field.heights,
+                field.most);
+      double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
+      if (ui_.numbers(info.point, "Input and output value of the selected point.", chosen, 0.005f * view.max_value))
+        move_point(points, view.chosen, {static_cast<float>(chosen[0]), static_cast<float>(chosen[1])});
+    }
+    color_ramp(model, i);
   }
 }
 
 void Panel::shape_ramp(Model& model, std::size_t index) {
   const settings::RampInfo& info = settings::ramps[index];
   settings::RampPoints& points = model.scene.ramps[index];
-  const float most = model.status.fields[index].most;
   std::vector<Choice> choices;
   for (const RampPreset& preset : ramp_presets())
     choices.push_back({preset.label, static_cast<int>(choices.size()), preset.tip});
   int chosen = -1;
-  std::string label = std::string(info.name) + " shape";
-  label.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(label.front())));
-  if (ui_.choose(label.c_str(), "Replaces the curve by a common one.", choices, chosen))
-    points = points_of(ramp_presets()[static_cast<std::size_t>(chosen)],
-                       most > 0.0f ? std::min(most, settings::max_ramp_value) : 1.0f);
+  if (ui_.choose(label_of(info.name, " shape").c_str(), "Replaces the curve by a common one.", choices, chosen))
+    points = points_of(ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(model.status.fields[index]));
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const std::string id = std::string("##") + info.name;
   if (ui_.button(("Copy" + id).c_str(), "Copies the curve as text, which the command line takes too.", {width, 0.0f}))
@@ -61,6 +74,58 @@ void Panel::shape_ramp(Model& model, std::size_t index) {
     points = *pasted;
   else
     show_message(model, false, "The clipboard has no curve", time_);
+}
+
+void Panel::color_ramp(Model& model, std::size_t index) {
+  const settings::ColorRampInfo& info = settings::color_ramps[index];
+  const FieldValues& field = model.status.fields[index];
+  if (!(field.most > 0.0f)) return;
+  settings::ColorStops& stops = model.scene.color_ramps[index];
+  ColorRampView& view = color_ramp_views_[index];
+  bool on = !stops.empty();
+  if (ui_.checkbox(info.label, info.tip, on)) {
+    stops.clear();
+    if (on) stops = first_stops(index, reach_of(field), model.scene.medium);
+  }
+  fit(view, stops, field.most);
+  if (stops.empty()) return;
+  choose_colors(model, index);
+  ui_.gradient((std::string(info.label) + " bar").c_str(),
+               "Drag to move a stop. Click to add one. Right-click, Delete or a drag off the bar removes it.", stops,
+               view);
+  settings::ColorStop& stop = stops[view.chosen];
+  double value[1] = {static_cast<double>(stop[0])};
+  if (ui_.numbers((std::string("Stop##") + info.label).c_str(), "Grid value of the selected stop.", value,
+                  0.005f * (view.max_value - view.min_value)))
+    move_stop(stops, view.chosen, static_cast<float>(value[0]));
+  // Emission may be brighter than a color field can show. Its brightness stays.
+  const float peak = std::max({1.0f, stop[1], stop[2], stop[3]});
+  float color[3] = {stop[1] / peak, stop[2] / peak, stop[3] / peak};
+  if (ui_.color((std::string("Stop color##") + info.label).c_str(), "Color of the selected stop.", color))
+    for (std::size_t i = 0; i < 3; ++i) stop[i + 1] = peak * color[i];
+}
+
+void Panel::choose_colors(Model& model, std::size_t index) {
+  const settings::ColorRampInfo& info = settings::color_ramps[index];
+  settings::ColorStops& stops = model.scene.color_ramps[index];
+  std::vector<Choice> choices;
+  for (const ColorRampPreset& preset : color_ramp_presets())
+    choices.push_back({preset.label, static_cast<int>(choices.size()), preset.tip});
+  int chosen = -1;
+  if (ui_.choose((std::string("Palette##") + info.label).c_str(), "Replaces the colors by common ones.", choices,
+                 chosen))
+    stops = stops_of(color_ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(model.status.fields[index]));
+  const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
+  const std::string id = std::string("##") + info.label;
+  if (ui_.button(("Copy" + id).c_str(), "Copies the colors as text, which the command line takes too.", {width, 0.0f}))
+    ImGui::SetClipboardText(color_ramp_text(stops).c_str());
+  ImGui::SameLine();
+  if (!ui_.button(("Paste" + id).c_str(), "Replaces the colors by the copied ones.", {width, 0.0f})) return;
+  const char* const copied = ImGui::GetClipboardText();
+  if (const auto pasted = color_ramp_of_text(info, copied != nullptr ? copied : ""))
+    stops = *pasted;
+  else
+    show_message(model, false, "The clipboard has no colors that suit this grid", time_);
 }
 
 }  // namespace cumulet::demo

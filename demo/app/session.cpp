@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <first_view.hpp>
 #include <program.hpp>
+#include <ramps.hpp>
 #include <settings.hpp>
 #include <span>
 #include <stdexcept>
@@ -28,7 +29,7 @@ constexpr double patience = 1.0;  // seconds to wait for the volume before surfa
 
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
-    return std::tie(volume.name, volume.visible, volume.transforms, volume.shutter, volume.ramps,
+    return std::tie(volume.name, volume.visible, volume.transforms, volume.shutter, volume.ramps, volume.color_ramps,
                     volume.auto_density_scale, volume.sequence);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
@@ -158,12 +159,10 @@ void Session::follow_transforms() {
 }
 
 void Session::follow_ramps() {
-  for (std::size_t i = 0; i < scene_.ramps.size(); ++i) {
-    const settings::RampPoints& points = scene_.ramps[i];
-    if (known_->ramps[i] == points) continue;
-    known_->ramps[i] = points;
-    check(cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i), settings::numbers_of(points), points.size()));
-  }
+  if (known_->ramps == scene_.ramps && known_->color_ramps == scene_.color_ramps) return;
+  known_->ramps = scene_.ramps;
+  known_->color_ramps = scene_.color_ramps;
+  check(set_ramps(viewer_.get(), scene_));
 }
 
 void Session::follow_ocio() {

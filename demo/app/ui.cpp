@@ -69,6 +69,7 @@ void Ui::begin(float scale, double time) {
   drawn_.clear();
   if (!hovered_now_) hovered_.clear();
   hovered_now_ = false;
+  takes_delete_ = false;
 }
 
 std::optional<Rectangle> Ui::find(const std::string& label) const {
@@ -131,7 +132,7 @@ void Ui::heading(const char* text) {
 
 void Ui::begin_row(const char* label) const {
   ImGui::AlignTextToFramePadding();
-  ImGui::TextUnformatted(label);
+  ImGui::TextUnformatted(label, ImGui::FindRenderedTextEnd(label));
   ImGui::SameLine(px(132.0f));
   ImGui::SetNextItemWidth(-1.0f);
 }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "color_ramp_edit.hpp"
 #include "ramp_edit.hpp"
 #include "replay.hpp"
 
@@ -76,6 +77,11 @@ class Ui {
   /// Edits a ramp's curve over a histogram. heights: bars with heights from 0 to 1 and equal widths from 0 to `reach`.
   bool curve(const char* label, const char* tip, settings::RampPoints& points, RampView& view,
              const std::vector<float>& heights, float reach);
+  /// Edits the stops of a color ramp on a bar of its colors. A click adds a stop, a drag moves it, and a right click,
+  /// the Delete key or a drag off the bar removes it.
+  bool gradient(const char* label, const char* tip, settings::ColorStops& stops, ColorRampView& view);
+  /// Returns true if the control under the mouse uses the Delete key itself.
+  [[nodiscard]] bool takes_delete() const { return takes_delete_; }
   /// Plots values over time, newest on the right. latest: the last value with its unit.
   void plot(const char* label, const char* tip, const std::vector<float>& values, const std::string& latest);
   /// Shows a name and a value.
@@ -114,6 +120,9 @@ class Ui {
   // near: index of the point under the mouse.
   void draw_curve(const CurveArea& area, const settings::RampPoints& points, const RampView& view,
                   std::optional<std::size_t> near, const std::vector<float>& heights, float reach) const;
+  struct GradientArea;
+  void draw_gradient(const GradientArea& area, const settings::ColorStops& stops, const ColorRampView& view,
+                     std::optional<std::size_t> near) const;
   // Returns the number that a slider takes: within its range, or within the limits of typed numbers.
   template <class Number>
   Number within_limits(const char* label, bool typing, Number number, Number least, Number most,
@@ -146,6 +155,7 @@ class Ui {
   std::string hovered_;
   double hovered_since_ = 0.0;
   bool hovered_now_ = false;
+  bool takes_delete_ = false;
 };
 
 /// Returns the text, or as much of its end as fits the width: the end of a path is the distinctive part.

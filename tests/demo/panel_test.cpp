@@ -377,6 +377,63 @@ TEST_P(PanelTest, RampsAreCopiedAndPasted) {
   EXPECT_EQ(model_.messages.back().text, "The clipboard has no curve");
 }
 
+// A color ramp is shown if the volume has its grid. Stops are added, dragged, dragged off and deleted, colors are
+// copied.
+TEST_P(PanelTest, ColorRampsAreEdited) {
+  model_.scene.volume = "/a/fire.vdb";
+  select(model_, Item{Item::Kind::volume, 0, 0});
+  auto& stops = model_.scene.color_ramps[CUMULET_RAMP_TEMPERATURE];
+  frame();
+  frame();
+  EXPECT_FALSE(panel_.ui().find("Temperature colors"));
+  EXPECT_FALSE(panel_.ui().controls().contains("Density colors")) << "there is no grid";
+  model_.status.fields[CUMULET_RAMP_DENSITY].most = 1.0f;
+  model_.status.fields[CUMULET_RAMP_TEMPERATURE].most = 2.0f;
+  const auto show = [&](const char* control) {
+    for (int i = 0; i < 5; ++i) {
+      panel_.ui().bring_into_view(control);
+      frame();
+    }
+  };
+  show("Temperature colors");
+  click("Temperature colors");
+  ASSERT_GE(stops.size(), 3u);
+  EXPECT_EQ(stops.back()[0], 2.0f);
+  EXPECT_FALSE(panel_.ui().controls().contains("Flame colors"));
+  stops = {{0.0f, 0.0f, 0.0f, 0.0f}, {2.0f, 4.0f, 2.0f, 0.0f}};
+  show("Temperature colors bar");
+  const auto at = [&](float along, float below = 0.5f) {
+    const Rectangle bar = *panel_.ui().find("Temperature colors bar");
+    return ImVec2(static_cast<float>(bar.x + along * bar.width), static_cast<float>(bar.y + below * bar.height));
+  };
+  drag_mouse(at(0.25f), at(0.5f));
+  ASSERT_EQ(stops.size(), 3u) << "a press beside the stops adds one";
+  EXPECT_NEAR(stops[1][0], 1.0f, 0.05f);
+  EXPECT_NEAR(stops[1][1], 1.0f, 0.2f) << "with the color of the place where it was added";
+  drag_mouse(at(0.5f), at(0.5f, 4.0f));
+  EXPECT_EQ(stops.size(), 2u) << "dragged off";
+  drag_mouse(at(0.75f), at(0.75f));
+  ASSERT_EQ(stops.size(), 3u);
+  frame(at(0.3f));
+  EXPECT_TRUE(panel_.ui().takes_delete());
+  ImGui::GetIO().KeyMap[ImGuiKey_Delete] = 261;
+  ImGui::GetIO().KeysDown[261] = true;
+  frame(at(0.3f));
+  ImGui::GetIO().KeysDown[261] = false;
+  frame(at(0.3f));
+  EXPECT_EQ(stops.size(), 2u) << "the selected one is deleted";
+  show("Copy##Temperature colors");
+  click("Copy##Temperature colors");
+  EXPECT_STREQ(ImGui::GetClipboardText(), "0:0/0/0,2:4/2/0");
+  EXPECT_FALSE(panel_.ui().takes_delete());
+  show("Density colors");
+  click("Density colors");
+  show("Paste##Density colors");
+  click("Paste##Density colors");
+  ASSERT_FALSE(model_.messages.empty());
+  EXPECT_EQ(model_.messages.back().text, "The clipboard has no colors that suit this grid") << "an albedo is at most 1";
+}
+
 TEST_P(PanelTest, RightClickResetsASetting) {
   select(model_, Part::render);
   panel_.ui().bring_into_view("Exposure");

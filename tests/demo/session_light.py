@@ -262,6 +262,33 @@ def test_ramp_shapes(s):
     assert len(ramp("undone", "flame")) == 2 and ramp("undone", "temperature") == shaped
 
 
+def test_color_ramps(s):
+    """Fire takes colors from a list instead of those of black bodies. They are copied to the flame, and a right click
+    removes a stop, each as one step. The Delete key removes the selected stop and not the volume."""
+    there = ["frames 2", "wait loaded", "wait converged", "frames 2"]
+    bar = '"Flame colors bar"'
+    s.play("replay", [*there, *shot("plain"), 'click "Temperature colors"', *there, 'click "Palette##Temperature colors"', "frames 2",
+                      'click "Palette##Temperature colors/Gas"', *there, 'click "Copy##Temperature colors"', "frames 2",
+                      'click "Flame colors"', *there, 'report "first.json"', 'click "Paste##Flame colors"', *there, *shot("pasted"),
+                      f"click {bar} 0.5 0.5 right", *there, 'report "removed.json"', f"click {bar} 0.3 0.3", "key delete", *there,
+                      'report "deleted.json"', "key ctrl+z", *there, 'report "undone.json"'],
+           "--volume", s.explosion, "--preset", "explosion", "--density-scale", "9", "--spp", "4", size=["--size", "900x700"])
+    ramp = lambda name, grid: s.report(name)["scene"]["medium"].get(f"{grid}_color_ramp")
+    gas = ramp("pasted", "temperature")
+    assert len(gas) == 5 and gas[0] == [0, 0, 0, 0] and gas[2][3] > gas[2][1], gas
+    first = ramp("first", "flame")
+    assert len(first) == 2 and first[0][1:] == first[1][1:] and first[0][1] > first[0][3], "the color of the preset"
+    assert ramp("pasted", "flame") == gas
+    assert ramp("removed", "flame") == gas[:2] + gas[3:]
+    assert ramp("deleted", "flame") == ramp("removed", "flame"), "the added stop, and not the volume"
+    hue = lambda picture, area: [sum(block[i] for block in picture.blocks(area)) for i in (0, 2)]
+    plain, report, area = look(s, "plain")
+    red, blue = hue(plain, area)
+    assert red > blue, "fire"
+    red, blue = hue(look(s, "pasted")[0], area)
+    assert blue > red, "gas"
+
+
 def test_auto_exposure(s):
     """A dark environment is exposed once after its load, as an undo step and without a change to save. An exposure that
     the user has set stays; the button replaces it. A flag, a scene file and the menu disable the automatic one."""
