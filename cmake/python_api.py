@@ -25,7 +25,7 @@ COUNTS = {"values": ("value_count", 1), "brick_origins": ("brick_count", 3), "br
           "brick_active": ("brick_count", 8), "tiles": ("tile_count", 1), "fields": ("field_count", 1),
           "positions": ("vertex_count", 3), "normals": ("vertex_count", 3), "colors": ("vertex_count", 4),
           "velocities": ("vertex_count", 3), "indices": ("index_count", 1), "meshes": ("mesh_count", 1),
-          "changed": ("changed_count", 1), "paths": ("count", 1)}
+          "changed": ("changed_count", 1), "paths": ("count", 1), "planes": ("plane_count", 4)}
 # Functions that read the image back: floats per pixel, as an expression.
 READS = {"cumulet_read_linear": "4", "cumulet_read_denoised": "4", "cumulet_read_light_group": "3",
          "cumulet_read_aov": "_support.floats_of(aov)"}

@@ -49,6 +49,10 @@
 #ifndef CM_HOLDOUT
 #define CM_HOLDOUT 0
 #endif
+// 1 if volume instances are clipped by planes; only with CM_INSTANCES.
+#ifndef CM_CLIP
+#define CM_CLIP 0
+#endif
 // 1 if there are several volume instances (glsl/traversal/instance.glsl).
 #ifndef CM_INSTANCES
 #define CM_INSTANCES 0

@@ -21,7 +21,7 @@
 // center. albedo.w is the mean view depth of the volume's first scattering, infinity if there is none. transmittance.y
 // is the fraction covered by surfaces, volume z's second component the fraction covered by the ground. For the
 // convergence test, transmittance.z is the number of rays and .w the mean square of cm_seen_along per ray.
-// variants: VOLUME or VOLUMES
+// variants: VOLUME or VOLUMES or VOLUMES CM_CLIP=1
 // variants: - or CM_SURFACES=1
 // variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_VELOCITY=1
 layout(local_size_x = 8, local_size_y = 8) in;

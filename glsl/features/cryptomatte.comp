@@ -7,7 +7,7 @@
 // has two pairs of an ID, as a float's bits, and its coverage, in descending order of coverage. Nothing is written
 // after a coverage of 0. Texels are relative to the tile. Objects without an ID (holdouts) occlude and write no
 // coverage.
-// variants: VOLUME or VOLUMES or VOLUMES CM_MOTION=1
+// variants: VOLUME or VOLUMES or VOLUMES CM_MOTION=1 or VOLUMES CM_CLIP=1 or VOLUMES CM_CLIP=1 CM_MOTION=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

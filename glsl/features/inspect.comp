@@ -1,6 +1,6 @@
 #version 450
 // Views of the grid, and the depth at half opacity, by one deterministic ray through each pixel's center.
-// variants: VOLUME or VOLUMES
+// variants: VOLUME or VOLUMES or VOLUMES CM_CLIP=1
 // variants: - or CM_SURFACES=1
 layout(local_size_x = 8, local_size_y = 8) in;
 

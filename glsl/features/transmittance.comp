@@ -4,7 +4,7 @@
 // uniform depths, in closed form per cell and without noise. Parallel rays are those of an orthographic view from the
 // light. Rays of a point light use octahedral mapping (octahedron.glsl). Texels lie on its folds, so that filtering
 // across a fold mixes equal rays.
-// variants: VOLUME or VOLUMES
+// variants: VOLUME or VOLUMES or VOLUMES CM_CLIP=1
 layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "common/bindings.glsl"

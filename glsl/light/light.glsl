@@ -186,6 +186,10 @@ CM_FN CmLightSample cm_cell_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
 #if CM_GROUPS
   cm_nee_group = CM_MEDIUM.group;
 #endif
+#if CM_CLIP
+  vec3 there = cm_record_v0(v0_shape, wide) + cm_from_frame(point * cm_shape_unit(shape), shape);
+  if (!cm_clip_keeps(cm_here, there)) light.radiance = vec3(0.0f, 0.0f, 0.0f);
+#endif
 #if CM_INSTANCES && CM_MOTION
   // The table's probabilities assume the volumes of the cells at the frame time.
   if (cm_instance_moves(cm_here))

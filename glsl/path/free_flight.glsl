@@ -26,7 +26,7 @@
 // Extinctions add where volumes overlap, so the nearest of their independent free-flight distances is distributed as
 // that of their sum. Free-flight sampling is memoryless, so the depth left after one volume continues in the next. A
 // new depth is drawn only after a collision, which becomes the new end of the ray. A shadow ray uses up one depth
-// through all volumes.
+// through all volumes. With CM_CLIP it enters and leaves a volume at the planes of that volume's clip.
 #ifndef CM_FREE_FLIGHT_GLSL
 #define CM_FREE_FLIGHT_GLSL
 
@@ -173,6 +173,14 @@ CM_FN void cm_aim(CM_INOUT(CmPath) p) {
 
 #endif
 
+// Distance at which the ray ends, or leaves the clip of the current volume. o, d: in cube space.
+CM_FN float cm_fly_end(CmPath p, vec3 o, vec3 d) {
+#if CM_CLIP
+  if (p.cell.x != CM_NONE) return min(p.t_end, cm_clip_end(cm_here, o, d));
+#endif
+  return p.t_end;
+}
+
 // Marches at most CM_CHUNK cells. Leaves t, cell and depth at the event, or at the point reached without one.
 CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
 #if CM_INSTANCES
@@ -185,8 +193,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   if (p.gathers != 0u) extinction = 0.0f;
 #endif
   CmMarchRay ray = cm_march_ray(o, d);
-  bool nowhere = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE;
-  uint event = nowhere ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
+  float t_end = cm_fly_end(p, o, d);
+  uint event = (CM_SURFACES != 0 || CM_INSTANCES != 0) && p.cell.x == CM_NONE ? CM_EVENT_ESCAPE : CM_EVENT_NONE;
   uvec3 cell = uvec3(p.cell.x, p.cell.y, p.cache);
   // Values of the last cell.
   CmBernstein r = CmBernstein(0.0f);
@@ -211,17 +219,17 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     span = t_1 - p.t;
     float used = extinction * (cm_segment_mean(r) * span);
     // Only up to a surface or light inside the cell.
-    if (CM_SURFACES != 0 && t_1 > p.t_end) used = cm_depth_of(extinction * r, span, p.t_end - p.t);
+    if (CM_SURFACES != 0 && t_1 > t_end) used = cm_depth_of(extinction * r, span, t_end - p.t);
     if (used > p.depth) {
       event = CM_EVENT_COLLISION;
     } else {
 #if CM_CHANNELS
-      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));
+      emitted += cm_emitted(emission, p.t, min(t_1, t_end));
 #endif
       p.depth -= used;
       p.t = t_1;
       cell = next;
-      if (next.x == CM_NONE || t_1 >= p.t_end) event = CM_EVENT_ESCAPE;
+      if (next.x == CM_NONE || t_1 >= t_end) event = CM_EVENT_ESCAPE;
     }
   }
   p.cell = uvec2(cell.x, cell.y);
@@ -229,7 +237,7 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
   CmBernstein e = extinction * r;
   // This follows the loop, because software drivers execute both sides of every branch in each step.
   if (event == CM_EVENT_COLLISION) {
-    float left = p.t_end - p.t;
+    float left = t_end - p.t;
     float way = cm_depth_distance(e, span, p.depth);
 #if CM_CHANNELS
     emitted += cm_emitted(emission, p.t, p.t + min(way, left));
@@ -237,8 +245,8 @@ CM_FN uint cm_fly(CM_INOUT(CmPath) p) {
     p.t += way;
     p.depth = way < left ? -1.0f : max(0.0f, p.depth - cm_depth_of(e, span, left));
     if (way >= left) event = CM_EVENT_ESCAPE;  // behind a surface
-  } else if (CM_SURFACES == 0 && event == CM_EVENT_ESCAPE && p.t > p.t_end) {
-    p.depth += cm_depth_of(cm_segment_reversed(e), span, p.t - p.t_end);
+  } else if (CM_SURFACES == 0 && event == CM_EVENT_ESCAPE && p.t > t_end) {
+    p.depth += cm_depth_of(cm_segment_reversed(e), span, p.t - t_end);
   }
 #if CM_CHANNELS
   bool takes = p.ray == CM_RAY_SCATTERED && !cm_is_dark(p);

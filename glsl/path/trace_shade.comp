@@ -1,7 +1,7 @@
 #version 450
 // Shades the triangles that paths have hit, or where their shadow rays started: glsl/path/path_queue.glsl.
 // variants: CM_SURFACES=1,2 or CM_SURFACES=1,2 CM_EQUIANGULAR=1 or CM_SURFACES=2 CM_EXTENDED_BSDF=1 or CM_SURFACES=2 CM_GROUPS=1 or CM_SURFACES=2 CM_EQUIANGULAR=1 CM_GROUPS=1 or CM_SURFACES=2 CM_EXTENDED_BSDF=1 CM_GROUPS=1
-// variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1 or CM_MOTION=1 or CM_CHANNELS=1 CM_INSTANCES=1 CM_MOTION=1
+// variants: - or CM_CHANNELS=1 or CM_CHANNELS=1 CM_INSTANCES=1 or CM_MOTION=1 or CM_CHANNELS=1 CM_INSTANCES=1 CM_MOTION=1 or CM_CHANNELS=1 CM_CLIP=1 CM_INSTANCES=1 or CM_CHANNELS=1 CM_CLIP=1 CM_INSTANCES=1 CM_MOTION=1
 // variants: - or CM_ENVIRONMENT=1
 // variants: - or CM_HOLDOUT=1
 layout(local_size_x = 8, local_size_y = 8) in;

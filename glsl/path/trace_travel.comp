@@ -1,6 +1,6 @@
 #version 450
 // Traverses the medium in scenes with triangles: glsl/path/path_queue.glsl.
-// variants: VOLUME or VOLUMES or VOLUMES CM_HOLDOUT=1 or VOLUMES CM_HOLDOUT=1 CM_MOTION=1
+// variants: VOLUME or VOLUMES or VOLUMES CM_HOLDOUT=1 or VOLUMES CM_HOLDOUT=1 CM_MOTION=1 or VOLUMES CM_CLIP=1 CM_HOLDOUT=1 or VOLUMES CM_CLIP=1 CM_HOLDOUT=1 CM_MOTION=1
 // variants: CM_SURFACES=1,2 or CM_SURFACES=2 CM_GROUPS=1
 // variants: - or CM_SECOND_LOBE=1
 // variants: - or CM_CHANNELS=1

@@ -57,6 +57,35 @@ CM_FN vec2 cm_instance_span(vec3 o, vec3 inverse, vec3 low, vec3 high) {
   return vec2(max(max(first.x, first.y), max(first.z, 0.0f)), min(min(last.x, last.y), last.z));
 }
 
+#if CM_CLIP
+// Clips the interval of a ray of cube space to the part where dot(normal, o + t d) + offset >= 0.
+CM_FN vec2 cm_clip_by_plane(vec3 normal, float offset, vec3 o, vec3 d, vec2 span) {
+  CM_PRECISE float height = normal.x * o.x + normal.y * o.y + normal.z * o.z + offset;
+  CM_PRECISE float slope = normal.x * d.x + normal.y * d.y + normal.z * d.z;
+  if (slope > 0.0f) return vec2(max(span.x, -height / slope), span.y);
+  if (slope < 0.0f) return vec2(span.x, min(span.y, -height / slope));
+  return height < 0.0f ? vec2(span.x, -3.0e38f) : span;
+}
+
+// Clips the interval of a ray to the planes of an instance, which are convex together. o, d: in its cube space.
+CM_FN vec2 cm_clip_span(uint at, vec3 o, vec3 d, vec2 span) {
+  uint first = cm_instances[at].clip >> 3u;
+  uint end = first + (cm_instances[at].clip & 7u);
+  for (uint i = first; i < end; ++i) {
+    CmInstanceNode pair = cm_instance_nodes[i];
+    span = cm_clip_by_plane(pair.low, uintBitsToFloat(pair.skip), o, d, span);
+    span = cm_clip_by_plane(pair.high, uintBitsToFloat(pair.instance), o, d, span);
+  }
+  return span;
+}
+
+// Distance at which a ray leaves the planes of an instance.
+CM_FN float cm_clip_end(uint at, vec3 o, vec3 d) { return cm_clip_span(at, o, d, vec2(0.0f, 3.0e38f)).y; }
+
+// Returns false if the planes cut off this point of cube space.
+CM_FN bool cm_clip_keeps(uint at, vec3 p) { return cm_clip_end(at, p, vec3(0.0f, 0.0f, 0.0f)) > 0.0f; }
+#endif
+
 // Finds the next instance that a ray o + t d, t >= 0, enters after `instance`, which it entered at `entry`. It is the
 // minimum of (entry, number) above the given pair, among instances that have all of these flags and are entered before
 // t_end. Begin with -1 and CM_INSTANCE_NONE. Returns false if there is none, and leaves both unchanged.
@@ -78,6 +107,9 @@ CM_FN bool cm_next_instance(vec3 o, vec3 d, float t_end, uint flags, CM_INOUT(fl
     if (hits && at != CM_INSTANCE_NONE) {
       vec2 own = cm_instance_span(cm_in_instance_point(at, o), cm_instance_inverse(cm_in_instance(at, d)),
                                   cm_instances[at].space.box_min, cm_instances[at].space.box_max);
+#if CM_CLIP
+      own = cm_clip_span(at, cm_in_instance_point(at, o), cm_in_instance(at, d), own);
+#endif
       float enters = max(own.x, span.x);
       bool after = enters > entry || (enters == entry && at > instance);
       bool before = enters < least || (enters == least && at < next);

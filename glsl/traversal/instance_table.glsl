@@ -1,5 +1,7 @@
-// The table of a scene's volume instances, in two std140 buffers: one record each, and a tree over their boxes. Shared
-// by GLSL and C++; the includer has parameters.glsl before this. Made by src/scene/instances.hpp.
+// The table of a scene's volume instances, in two std140 buffers: one record each, and a tree over their boxes. Behind
+// the tree's nodes are the clip records: two planes each, in the fields of a node. A plane's normal is in `low` or
+// `high`, and its offset has the bits of the next field. Shared by GLSL and C++; the includer has parameters.glsl before
+// this. Made by src/scene/instances.hpp.
 #ifndef CM_INSTANCE_TABLE_GLSL
 #define CM_INSTANCE_TABLE_GLSL
 
@@ -20,6 +22,7 @@ CM_BLOCK(CmInstance) {
   uint flags;
   uint alias;        // alias table: a uniformly drawn entry stays if a random word is below this,
   uint alias_other;  // else this other instance is used
+  uint clip;         // CM_CLIP only: clip records: their number in the lowest 3 bits, above it the index of the first
 };
 
 #endif

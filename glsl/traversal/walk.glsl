@@ -50,6 +50,14 @@ void cm_front_step(vec3 o, vec3 d, float t, inout CmFront front) {
   CmBernstein r;
   cm_march_step(front.cell, ray, t, front.t_1, r, front.next);
   front.e = CM_MEDIUM.extinction * r;
+#if CM_CLIP
+  float t_end = max(t, cm_clip_end(front.volume, ray.o, ray.d));
+  if (t_end < front.t_1) {
+    front.e = cm_segment_part(front.e, 0.0, (t_end - t) / (front.t_1 - t));
+    front.t_1 = t_end;
+    front.next.x = CM_NONE;
+  }
+#endif
 }
 
 float cm_front_extinction(CmFront front, float t) {
@@ -149,7 +157,11 @@ bool cm_walk_to(inout CmWalk walk, float t) {
     front.volume = walk.volume;
     cm_stand_at(front);
     vec3 p = cm_in_volume_point(walk.o) + t * cm_in_volume(walk.d);
-    if (p == clamp(p, CM_GRID.box_min, CM_GRID.box_max)) {
+    bool kept = p == clamp(p, CM_GRID.box_min, CM_GRID.box_max);
+#if CM_CLIP
+    kept = kept && cm_clip_keeps(front.volume, p);
+#endif
+    if (kept) {
       front.cell = cm_march_enter(p);
       walk.front[0] = front;
       return true;

@@ -14,6 +14,7 @@
 #include "assets/surface_asset.hpp"
 #include "assets/volume_asset.hpp"
 #include "base/listeners.hpp"
+#include "scene/snapshot.hpp"
 
 namespace cumulet::viewer {
 
@@ -26,6 +27,7 @@ struct InstanceSettings {
   std::optional<scene::ShutterTransforms> ends = {};  ///< transforms at shutter open and close; nullopt: no motion
   Medium medium = {};
   Ramps ramps = {};
+  scene::ClipPlanes clip = {};
   bool hidden = false;
   std::uint64_t tag = 0;                                  ///< for the host's own use
   std::optional<scene::InstanceTransform> previous = {};  ///< transform one frame ago; nullopt: unchanged

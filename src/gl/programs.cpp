@@ -253,7 +253,7 @@ std::vector<ProgramKey> all_programs() {
   // These are more than half of all variants.
   const auto rare = [](const ShaderMacro& macro) {
     const auto is = [&](MacroName name) { return macro.name == name.text(); };
-    return is(macros::groups) || is(macros::holdout) || is(macros::motion) || is(macros::wide);
+    return is(macros::groups) || is(macros::holdout) || is(macros::clip) || is(macros::motion) || is(macros::wide);
   };
   std::vector<ProgramKey> all;
   for (const Shader& shader : shaders()) {

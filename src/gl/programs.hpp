@@ -157,8 +157,8 @@ class Programs {
 
 using ProgramsPtr = std::shared_ptr<Programs>;
 
-/// Returns every variant in the table except rarely used ones: light groups, holdouts, motion blur, wide grids. For
-/// macros with a range of numbers, only the first number.
+/// Returns every variant in the table except rarely used ones: light groups, holdouts, clips, motion blur, wide grids.
+/// For macros with a range of numbers, only the first number.
 std::vector<ProgramKey> all_programs();
 
 /// Determines Functions::dispatches_in_call with a small dispatch. Needs a StateGuard in scope. Throws on a GL error.

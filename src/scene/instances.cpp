@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <glm/gtc/matrix_transform.hpp>
@@ -92,6 +93,27 @@ void set_emissive(InstanceTable& table, const std::vector<InstanceEmissive>& emi
   }
 }
 
+// Appends the clip records of an instance, and returns CmInstance::clip.
+std::uint32_t append_clip(std::vector<CmInstanceNode>& nodes, const ClipPlanes& planes,
+                          const glm::dmat4& cube_to_world) {
+  if (planes.empty()) return 0;
+  const auto first = static_cast<std::uint32_t>(nodes.size());
+  // A plane that keeps everything fills the last record.
+  const auto put = [](const glm::dvec4& plane, vec3& normal, std::uint32_t& offset) {
+    constexpr double most = 1e30;
+    const double length = glm::length(dvec3(plane));
+    normal = length > 0.0 ? vec3(dvec3(plane) / length) : vec3(0.0F);
+    const double distance = length > 0.0 ? plane.w / length : 1.0;
+    offset = std::bit_cast<std::uint32_t>(static_cast<float>(std::clamp(distance, -most, most)));
+  };
+  for (std::size_t i = 0; i < planes.size(); i += 2) {
+    CmInstanceNode& record = nodes.emplace_back();
+    put(planes[i] * cube_to_world, record.low, record.skip);
+    put(i + 1 < planes.size() ? planes[i + 1] * cube_to_world : glm::dvec4(0.0), record.high, record.instance);
+  }
+  return first << 3U | static_cast<std::uint32_t>(nodes.size() - first);
+}
+
 }  // namespace
 
 dvec3 origin_of(std::span<const Instance> instances) {
@@ -160,6 +182,8 @@ InstanceTable make_instances(std::span<const Instance> instances, const dvec3& o
     if (node.instance != core::CM_INSTANCE_NONE && overlaps_another(table, blocks, node))
       table.records[node.instance].flags |= core::CM_INSTANCE_OVERLAPS;
   }
+  for (std::size_t i = 0; i < count; ++i)
+    table.records[i].clip = append_clip(table.nodes, instances[i].clip, instances[i].source->cube.to_world);
   set_emissive(table, emissive);
   return table;
 }

@@ -18,6 +18,8 @@ namespace cumulet::core {
 
 namespace cumulet::scene {
 
+inline constexpr std::size_t max_clip_planes = 14;
+
 /// A volume instance: a source, its transform and its medium.
 struct Instance {
   MarchSourcePtr source;      ///< not null
@@ -27,6 +29,7 @@ struct Instance {
   bool hidden_from_camera = false;
   std::optional<ShutterTransforms> ends = {};  ///< transforms at shutter open and close; empty: it does not move
   EmissiveSum emissive{};                      ///< emission of the source's cells
+  ClipPlanes clip = {};                        ///< at most max_clip_planes
 };
 
 /// The arrays are copied to buffers unchanged; `ends` follows `records`.
@@ -35,8 +38,9 @@ struct InstanceTable {
   /// Transforms of all instances at shutter open, then at shutter close; only the spaces are set. Empty if nothing
   /// moves.
   std::vector<core::CmInstance> ends;
-  std::vector<core::CmInstanceNode> nodes;  ///< at least one; the box of the first contains all others
-  double emissive_power = 0.0;              ///< of all instances; see EmissiveSum for both
+  /// At least one; the box of the first contains all others. Clip records follow the tree's nodes.
+  std::vector<core::CmInstanceNode> nodes;
+  double emissive_power = 0.0;  ///< of all instances; see EmissiveSum for both
   double emissive_length = 0.0;
 };
 

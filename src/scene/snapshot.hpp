@@ -74,6 +74,10 @@ using SequenceFrames = std::vector<SequenceFrame>;
   return std::ranges::find(frames, frame) != frames.end();
 }
 
+/// Planes that cut a volume, in the world space of its source: the part with dot(plane, (p, 1)) >= 0 for all of them is
+/// shown. No normal is 0. Empty: all of it.
+using ClipPlanes = std::vector<glm::dvec4>;
+
 /// A volume instance: a source in its own world space, with a transform. Units of length are those of the scene,
 /// independent of the scale of the transform: extinction and emission are per scene unit.
 struct Volume {
@@ -83,6 +87,7 @@ struct Volume {
   InstanceTransform transform;
   std::optional<SequenceFrame> frame = {};         ///< if it is of a sequence or a dynamic volume
   std::optional<InstanceTransform> previous = {};  ///< transform in the previous frame; empty: unchanged
+  ClipPlanes clip = {};
   bool operator==(const Volume&) const = default;
 };
 

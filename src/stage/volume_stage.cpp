@@ -226,7 +226,7 @@ grid::Interpolation VolumeStage::interpolation_of(const Live& live) {
   if (live.values_wanted() == nullptr) return grid_.build.interpolation;
   const bool is_linear = grid_.interpolation_in_gl == grid_.build.interpolation;
   const bool is_trilinear = grid_.build.refine.cells == grid::CellKind::trilinear;
-  if ((!is_linear || is_trilinear) && !std::exchange(remarked_interpolation_, true))
+  if ((!is_linear || is_trilinear) && !std::exchange(remarked_.interpolation, true))
     log_.info(
         is_linear
             ? "GPU-resident dynamic volumes are copied to main memory, because trilinear cells need interpolation "
@@ -387,11 +387,11 @@ void VolumeStage::set_ramps(const Ramps& ramps) {
 }
 
 void VolumeStage::remark_on_anisotropy() {
-  if (medium_.phase.may_vary()) remarked_anisotropy_.reset();
+  if (medium_.phase.may_vary()) remarked_.anisotropy.reset();
   if (!volume_info_ || !volume_info_->anisotropy_grid || medium_.phase.may_vary()) return;
   const std::string& name = *volume_info_->anisotropy_grid;
-  if (remarked_anisotropy_ == name) return;
-  remarked_anisotropy_ = name;
+  if (remarked_.anisotropy == name) return;
+  remarked_.anisotropy = name;
   log_.info("grid \"" + name + "\" is ignored: the Mie phase function has its own anisotropy");
 }
 
@@ -677,6 +677,7 @@ std::vector<scene::Volume> VolumeStage::volumes(const std::vector<scene::Volume>
           {0, source, shown_medium_, {transform.to_world, while_open(transform.ends, shutter_seconds_)}, frame});
     for (std::size_t i = 0; i < std::min(volumes.size(), previous_transforms_.size()); ++i)
       volumes[i].previous = previous_transforms_[i];
+    if (shown_info()) std::ranges::for_each(volumes, [this](scene::Volume& volume) { volume.clip = clip_; });
   }
   for (const Shown& shown : shown_) {
     if (shown.is_seen() && shown.built)
@@ -685,7 +686,8 @@ std::vector<scene::Volume> VolumeStage::volumes(const std::vector<scene::Volume>
                          shown.medium,
                          {shown.settings.to_world, while_open(shown.settings.ends, shutter_seconds_)},
                          shown.frame(),
-                         shown.settings.previous});
+                         shown.settings.previous,
+                         shown.settings.clip});
   }
   const auto differs = [&](const scene::Volume& volume) {
     const scene::MarchSource& first = *volumes.front().source;

@@ -71,6 +71,10 @@ class VolumeStage {
   void remove_instance(const Instance& instance);
   void set_grid(const GridSettings& settings);
   void set_ramps(const Ramps& ramps);
+  void set_clip(scene::ClipPlanes clip) {
+    clip_ = std::move(clip);
+    host_.touch();
+  }
   void set_medium(const Medium& medium);
   /// previews: if off, images show only the requested volume, and no frame waits until another has been displayed.
   void set_preview(bool previews);
@@ -300,16 +304,20 @@ class VolumeStage {
   Medium medium_;
   Ramps ramps_;
   bool preview_ = true;
-  bool remarked_interpolation_ = false;  // that of GPU-resident volumes was logged
   double shutter_seconds_ = 0.0;
   VolumeAssetPtr volume_;
   VolumeInfoPtr volume_info_;
-  VolumeAssetPtr empty_volume_;                          // used for surfaces without a volume
-  std::optional<std::string> remarked_anisotropy_;       // the ignored grid that was logged
+  VolumeAssetPtr empty_volume_;  // used for surfaces without a volume
+  struct Remarked {
+    bool interpolation = false;             // that of GPU-resident volumes was logged
+    std::optional<std::string> anisotropy;  // the ignored grid that was logged
+  };
+  Remarked remarked_;
   Built built_;                                          // newest; uploaded again after a change of context
   bool cuts_own_ = false;                                // the running build coarsens it to fit a limit
   std::vector<scene::InstanceTransform> transforms_{1};  // instance transforms of the volume; at least one
   std::vector<scene::InstanceTransform> previous_transforms_;
+  scene::ClipPlanes clip_;                   // of all instances of the volume
   bool transforms_changed_ = false;          // since the last traced frame
   scene::Part<scene::Medium> shown_medium_;  // of the viewer's own volume
   std::vector<Shown> shown_;                 // in the order in which they were added

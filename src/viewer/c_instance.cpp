@@ -3,6 +3,7 @@
 #include <array>
 #include <memory>
 
+#include "viewer/c_clip.hpp"
 #include "viewer/c_handles.hpp"
 #include "viewer/c_ramp.hpp"
 #include "viewer/c_settings.hpp"
@@ -15,7 +16,7 @@ using cumulet::viewer::Instance;
 using cumulet::viewer::InstanceSettings;
 using cumulet::viewer::Medium;
 
-// Everything except the ramps and color ramps.
+// Everything except the ramps, the color ramps and the clip.
 InstanceSettings settings_of(const cumulet_instance_desc* desc) {
   const cumulet_instance_desc d = read_desc(desc, "cumulet_instance_desc");
   require(d.hidden == 0 || d.hidden == 1, "cumulet_instance_desc.hidden is not 0 or 1");
@@ -52,6 +53,7 @@ cumulet_status cumulet_instance_set(cumulet_instance* instance, const cumulet_in
     InstanceSettings settings = settings_of(desc);
     i.edit([&](InstanceSettings& old) {
       settings.ramps = std::move(old.ramps);
+      settings.clip = std::move(old.clip);
       std::swap(old, settings);  // the old contents are destroyed after the lock is released
     });
   });
@@ -82,6 +84,13 @@ cumulet_status cumulet_instance_set_color_ramp(cumulet_instance* instance, cumul
   return on(instance, "instance", [&](Instance& i) {
     auto read = read_color_ramp(ramp, stops, count);
     i.edit([&](InstanceSettings& settings) { std::swap(settings.ramps.*read.target, read.ramp); });
+  });
+}
+
+cumulet_status cumulet_instance_set_clip(cumulet_instance* instance, const cumulet_clip_desc* desc) {
+  return on(instance, "instance", [&](Instance& i) {
+    cumulet::scene::ClipPlanes planes = clip_planes_of(desc);
+    i.edit([&](InstanceSettings& settings) { std::swap(settings.clip, planes); });
   });
 }
 

@@ -160,6 +160,8 @@ class Viewer final : private StageHost {
   void set_medium(const Medium& medium) { stage_.volumes.set_medium(medium); }
   void set_ramps(const Ramps& ramps) { stage_.volumes.set_ramps(ramps); }
   [[nodiscard]] const Ramps& ramps() const { return stage_.volumes.ramps(); }
+  /// Clips the viewer's own volume, sequence or dynamic volume. No grid is rebuilt.
+  void set_clip(scene::ClipPlanes clip) { stage_.volumes.set_clip(std::move(clip)); }
   void set_light(const Light& light) { stage_.sky.set_light(light); }
   void set_lights(light::AnalyticLights lights) { stage_.sky.set_lights(std::move(lights)); }
   void load_environment(const FilePath& path) { stage_.sky.load_environment(path); }

@@ -101,6 +101,10 @@ TEST(CppInstance, IsSharedByCopies) {
   EXPECT_TRUE(instance.set_ramp(Ramp::density, same).has_value());
   constexpr std::array<std::array<float, 4>, 2> gray{{{0.0F, 0.5F, 0.5F, 0.5F}, {1.0F, 1.0F, 1.0F, 1.0F}}};
   EXPECT_TRUE(instance.set_color_ramp(Ramp::density, gray).has_value());
+  constexpr std::array<std::array<double, 4>, 1> plane{{{0.0, 1.0, 0.0, -2.0}}};
+  EXPECT_TRUE(instance.set_clip({.box = Bounds{{0.0, 0.0, 0.0}, {1.0, 2.0, 3.0}}, .planes = plane}).has_value());
+  EXPECT_FALSE(instance.set_clip({.box = Bounds{{0.0, 0.0, 0.0}, {1.0, 0.0, 3.0}}}).has_value());
+  EXPECT_TRUE(instance.set_clip({}).has_value());
   EXPECT_TRUE(instance.set({.volume = volume, .medium = {.density_scale = 2.0}, .hidden = true}).has_value());
   EXPECT_FALSE(Instance().set({}).has_value());
 }

@@ -15,6 +15,20 @@ void expect_same(const Range& range, const Values& values) {
   EXPECT_TRUE(std::ranges::equal(range, values)) << testing::PrintToString(range);
 }
 
+TEST(CppDescs, ClipConvertsToTheCStruct) {
+  constexpr std::array<std::array<double, 4>, 2> planes{{{1.0, 2.0, 3.0, 4.0}, {5.0, 6.0, 7.0, 8.0}}};
+  const cumulet_clip_desc clip = ClipDesc{.box = Bounds{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}}, .planes = planes};
+  EXPECT_EQ(clip.struct_size, sizeof clip);
+  EXPECT_EQ(clip.box, 1);
+  expect_same(clip.box_min, Vector{1.0, 2.0, 3.0});
+  expect_same(clip.box_max, Vector{4.0, 5.0, 6.0});
+  EXPECT_EQ(clip.planes, planes.front().data());
+  EXPECT_EQ(clip.plane_count, 2U);
+  const cumulet_clip_desc no_clip = ClipDesc{};
+  EXPECT_EQ(no_clip.box, 0);
+  EXPECT_EQ(no_clip.planes, nullptr);
+}
+
 TEST(CppDescs, ConvertToTheCStructs) {
   const cumulet_grid_desc grid = GridDesc{.type = GridType::bricks,
                                           .cells = CellDensity::constant,

@@ -135,7 +135,8 @@ TEST_P(GlInstanceTree, RecordLayoutMatchesTheDriver) {
                                    CM_RECORD(medium.changes),
                                    CM_RECORD(flags),
                                    CM_RECORD(alias),
-                                   CM_RECORD(alias_other)};
+                                   CM_RECORD(alias_other),
+                                   CM_RECORD(clip)};
   const std::vector<Field> nodes{CM_NODE(low), CM_NODE(skip), CM_NODE(high), CM_NODE(instance)};
   const gl::Object program = test::compute_program(gl_, head() + R"(
 layout(local_size_x = 1) in;

@@ -45,7 +45,7 @@ std::string undeclared(const PathFeatures& features) {
 // Features as path_features() may return them.
 bool is_possible(const PathFeatures& f) {
   const bool emitting = f.triangles == PathTriangles::emitting;
-  if ((f.volume_holdout || f.motion) && !f.grid.several) return false;
+  if ((f.volume_holdout || f.motion || f.grid.clipped) && !f.grid.several) return false;
   if (!f.anisotropic && (f.ground_or_disk || f.grid.several || f.second_lobe)) return false;
   if (!f.ground_or_disk && (f.grid.several || f.layered != Layered::no || f.has_stages() || f.channels ||
                             f.analytic_lights || f.separate_volume_aov || f.light_groups > 0))
@@ -60,10 +60,10 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
   int pictures = 0;
   for (const bool several : {false, true}) {
     for (const PathTriangles triangles : {PathTriangles::none, PathTriangles::hit, PathTriangles::emitting}) {
-      for (unsigned bits = 0; bits < 1U << 14U; ++bits) {
+      for (unsigned bits = 0; bits < 1U << 15U; ++bits) {
         const auto bit = [&](unsigned i) { return (bits >> i & 1U) != 0; };
         PathFeatures features;
-        features.grid = {March::dense, false, 1, false, several};
+        features.grid = {March::dense, false, 1, false, several, false, bit(14)};
         features.layered = bit(0) ? Layered::within : Layered::no;
         features.triangles = triangles;
         features.light_groups = bit(1) ? 2 : 0;
@@ -93,7 +93,9 @@ TEST(PathFeatures, NeedOnlyDeclaredVariantsForEachGrid) {
   for (const bool linear : {false, true}) {
     for (const std::size_t pages : {1, 2, 6}) grids.push_back({March::tet, linear, pages, false, false});
     grids.push_back({March::tet, linear, 6, true, false});
-    for (const bool wide : {false, true}) grids.push_back({March::tet, linear, 6, wide, true});
+    for (const bool clipped : {false, true}) {
+      for (const bool wide : {false, true}) grids.push_back({March::tet, linear, 6, wide, true, false, clipped});
+    }
   }
   for (const bool wide : {false, true}) {
     for (const bool several : {false, true}) grids.push_back({March::tet, true, 6, wide, several, true});

@@ -2664,6 +2664,39 @@ CUMULET_API cumulet_status cumulet_set_ramp(cumulet_viewer* viewer, cumulet_ramp
  */
 CUMULET_API cumulet_status cumulet_set_color_ramp(cumulet_viewer* viewer, cumulet_ramp ramp, const float* stops,
                                                   uint64_t count);
+/** Maximum number of planes of a cumulet_clip_desc. */
+enum { CUMULET_CLIP_PLANES = 6 };
+
+/**
+ * The part of a volume that is shown: the intersection of a box and of half-spaces. It is in the volume's own world
+ * space, which is that of the bounds in cumulet_volume_info, so it moves with cumulet_set_volume_transforms and
+ * cumulet_instance_desc.to_world. Six planes make a box in any orientation. Zeros show the whole volume.
+ */
+typedef struct cumulet_clip_desc {
+  size_t struct_size;
+  int32_t box;          /**< 1: the volume is clipped to box_min and box_max. */
+  double box_min[3];    /**< Lowest corner, each number within 1e30. */
+  double box_max[3];    /**< Highest corner, above box_min. */
+  const double* planes; /**< 4 per plane: a, b, c and d. The part with a x + b y + c z + d >= 0 is shown. */
+  uint64_t plane_count; /**< 0 to CUMULET_CLIP_PLANES. */
+} cumulet_clip_desc;
+
+/**
+ * Clips every volume that the viewer shows as its own. Outside the clip it has no extinction and no emission: for the
+ * camera, for shadows and scattered light, and in feature buffers, picks and transmittance maps. The cut is exact for
+ * all grid types: rays enter and leave cells at its planes. A change starts a new image and rebuilds no grid.
+ *
+ * Properties of a volume ignore clips: cumulet_volume_info, the suggested density scale, bounds, a ground plane below
+ * the volume, and camera fitting. A clipped volume is traced as instances are, in a table that grows by some 200 bytes.
+ *
+ * Threads: any thread. No GL.
+ *
+ * @param viewer The viewer.
+ * @param desc   The clip; copied. NULL: none, the default.
+ * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT for a box that is empty, for more planes than
+ *         CUMULET_CLIP_PLANES, for a plane without direction, and for numbers that are not within 1e30.
+ */
+CUMULET_API cumulet_status cumulet_set_clip(cumulet_viewer* viewer, const cumulet_clip_desc* desc);
 /** Histogram of a volume's grid, before its ramp: for a panel that draws the ramp over it. */
 typedef struct cumulet_histogram_info {
   size_t struct_size;
@@ -2767,7 +2800,8 @@ CUMULET_API cumulet_instance* cumulet_instance_retain(cumulet_instance* instance
  */
 CUMULET_API void cumulet_instance_release(cumulet_instance* instance);
 /**
- * Replaces all properties of an instance except its ramps. A previous transform (cumulet_instance_set_previous) ends.
+ * Replaces all properties of an instance except its ramps and its clip. A previous transform
+ * (cumulet_instance_set_previous) ends.
  *
  * Threads: any thread; runs update callbacks of viewers that show the instance. No GL.
  *
@@ -2813,6 +2847,16 @@ CUMULET_API cumulet_status cumulet_instance_set_ramp(cumulet_instance* instance,
  */
 CUMULET_API cumulet_status cumulet_instance_set_color_ramp(cumulet_instance* instance, cumulet_ramp ramp,
                                                            const float* stops, uint64_t count);
+/**
+ * Clips this instance only, with the rules of cumulet_set_clip.
+ *
+ * Threads: any thread; runs update callbacks of viewers that show the instance. No GL.
+ *
+ * @param instance The instance.
+ * @param desc     The clip; copied. NULL: none, the default.
+ * @return CUMULET_OK, or CUMULET_ERROR_INVALID_ARGUMENT for the causes of cumulet_set_clip; nothing changes then.
+ */
+CUMULET_API cumulet_status cumulet_instance_set_clip(cumulet_instance* instance, const cumulet_clip_desc* desc);
 /**
  * Shows an instance in a viewer, and follows its changes.
  *

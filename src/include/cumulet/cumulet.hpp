@@ -943,6 +943,30 @@ class DynamicVolume {
   cumulet_dynamic_volume* handle_ = nullptr;
 };
 
+// ---- Clips ----------------------------------------------------------------------------------------------------------
+
+/// Maximum number of planes of a ClipDesc.
+inline constexpr std::uint64_t max_clip_planes = CUMULET_CLIP_PLANES;
+
+/// The part of a volume that is shown: the intersection of a box and of half-spaces a x + b y + c z + d >= 0.
+struct ClipDesc {
+  std::optional<Bounds> box = {};
+  std::span<const std::array<double, 4>> planes = {};
+
+  operator cumulet_clip_desc() const noexcept {
+    cumulet_clip_desc c{};
+    c.struct_size = sizeof c;
+    c.box = box ? 1 : 0;
+    for (std::size_t axis = 0; axis < 3 && box; ++axis) {
+      c.box_min[axis] = box->min[axis];
+      c.box_max[axis] = box->max[axis];
+    }
+    c.planes = planes.empty() ? nullptr : planes.front().data();
+    c.plane_count = planes.size();
+    return c;
+  }
+};
+
 // ---- Instances ------------------------------------------------------------------------------------------------------
 
 /// Content, transform and medium of an instance. At most one of volume, sequence and dynamic_volume is set.
@@ -997,6 +1021,11 @@ class Instance {
     const float* first = stops.empty() ? nullptr : stops.front().data();
     return detail::result(
         cumulet_instance_set_color_ramp(handle_, static_cast<cumulet_ramp>(ramp), first, stops.size()));
+  }
+  /// An empty descriptor removes the clip.
+  [[nodiscard]] Result<> set_clip(const ClipDesc& desc) const noexcept {
+    const cumulet_clip_desc c = desc;
+    return detail::result(cumulet_instance_set_clip(handle_, &c));
   }
 
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != nullptr; }
@@ -1512,6 +1541,11 @@ class Viewer {
   [[nodiscard]] Result<> set_color_ramp(Ramp ramp, std::span<const std::array<float, 4>> stops) noexcept {
     const float* first = stops.empty() ? nullptr : stops.front().data();
     return result(cumulet_set_color_ramp(handle(), static_cast<cumulet_ramp>(ramp), first, stops.size()));
+  }
+  /// Clips the viewer's own volume; an empty descriptor removes the clip.
+  [[nodiscard]] Result<> set_clip(const ClipDesc& desc) noexcept {
+    const cumulet_clip_desc c = desc;
+    return result(cumulet_set_clip(handle(), &c));
   }
   [[nodiscard]] Result<> load_surfaces(const std::string& path) noexcept {
     return result(cumulet_load_surfaces(handle(), path.c_str()));

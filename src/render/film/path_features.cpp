@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "render/scene/instance_data.hpp"
 #include "render/scene/march_data.hpp"
 #include "render/scene/parameters.hpp"
 #include "render/scene/trace_inputs.hpp"
@@ -25,8 +26,8 @@ void add_groups(const PathFeatures& features, Macros& more) {
 
 // Adds the macros that the holdouts, motion and light groups of a picture need.
 void add_march(const PathFeatures& features, Macros& more) {
-  // To limit the number of variants, those for motion include holdouts.
-  if (features.volume_holdout || features.motion) more.push_back(macros::holdout(1));
+  // To limit the number of variants, those for motion and for clips include holdouts.
+  if (features.volume_holdout || features.motion || features.grid.clipped) more.push_back(macros::holdout(1));
   add_groups(features, more);
 }
 
@@ -42,7 +43,8 @@ gl::ProgramKey key(const char* name, const GridFeatures& grid, const Macros& mor
 }
 
 GridFeatures grid_of(const MarchData& data, const TraceInputs& trace_inputs) {
-  return grid_features(data, trace_inputs.instances != nullptr);
+  const InstanceData* instances = trace_inputs.instances;
+  return grid_features(data, instances != nullptr, instances != nullptr && instances->clips());
 }
 
 PathTriangles triangles_of(const PictureParameters& parameters, const TraceInputs& trace_inputs,
@@ -60,18 +62,19 @@ PathTriangles triangles_of(const PictureParameters& parameters, const TraceInput
 
 }  // namespace
 
-GridFeatures grid_features(const MarchData& data, bool several) {
+GridFeatures grid_features(const MarchData& data, bool several, bool clipped) {
   const bool wide = data.is_wide();
   // The page count is one, two or the maximum, to limit the number of programs.
   std::size_t pages = std::max<std::size_t>(data.pages(), 1);
   if (pages > 2 || wide || data.is_trilinear() || (several && data.march() == March::tet)) pages = MarchData::max_pages;
-  return {data.march(), data.is_linear(), pages, wide, several, data.is_trilinear()};
+  return {data.march(), data.is_linear(), pages, wide, several, data.is_trilinear(), clipped};
 }
 
 std::vector<std::string> grid_macros(const GridFeatures& grid, bool motion) {
   const int degree = grid.trilinear ? 2 : static_cast<int>(grid.linear);
   Macros all{macros::march(grid.march), macros::linear(degree), macros::pages(grid.pages)};
   if (grid.several) all.push_back(macros::instances(1));
+  if (grid.clipped) all.push_back(macros::clip(1));
   if (motion) all.push_back(macros::motion(1));
   if (grid.wide) all.push_back(macros::wide(1));
   return all;
@@ -144,6 +147,7 @@ StageKeys stage_keys(const PathFeatures& features) {
   if (features.channels) {
     shade.push_back(macros::channels(1));
     if (features.grid.several) shade.push_back(macros::instances(1));
+    if (features.grid.clipped) shade.push_back(macros::clip(1));
   }
   if (features.environment) shade.push_back(macros::environment(1));
   if (features.equiangular) shade.push_back(macros::equiangular(1));

@@ -31,10 +31,11 @@ struct GridFeatures {
   bool wide = false;       // cells have the wide format
   bool several = false;    // several volumes
   bool trilinear = false;  // density is trilinear in the finest tetrahedra
+  bool clipped = false;    // several: some are clipped
 };
 
-/// several: the volumes have an instance table (InstanceData).
-GridFeatures grid_features(const MarchData& data, bool several);
+/// several: the volumes have an instance table (InstanceData). clipped: some of them are clipped.
+GridFeatures grid_features(const MarchData& data, bool several, bool clipped = false);
 /// Returns the macros that select this grid type in a shader. motion: something moves while the shutter is open.
 std::vector<std::string> grid_macros(const GridFeatures& grid, bool motion = false);
 

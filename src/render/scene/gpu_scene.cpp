@@ -89,6 +89,8 @@ core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm:
 
 bool moves(const scene::Volume& volume) { return volume.transform.ends || volume.source->changes(); }
 
+bool is_clipped(const scene::Volume& volume) { return !volume.clip.empty(); }
+
 bool is_hole(const scene::Volume& volume) { return (*volume.medium).holdout; }
 
 // Returns each source once.
@@ -143,11 +145,11 @@ std::vector<scene::Volume> GpuScene::came_with_data(const scene::Snapshot& snaps
 bool GpuScene::models_move() const { return model_instances_ && !model_instances_->table().ends.empty(); }
 
 void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& wanted) {
-  // If anything moves, a single volume also uses an instance table, so that fewer programs are needed. Holdouts exist
-  // only in instance tables.
+  // If anything moves, a single volume also uses an instance table, so that fewer programs are needed. Holdouts and
+  // clips exist only in instance tables.
   const auto stands_alone = [&] {
     return present_.size() < 2 && std::ranges::none_of(present_, is_hole) && std::ranges::none_of(present_, moves) &&
-           !snapshot.view_ends->has_value() && !models_move();
+           std::ranges::none_of(present_, is_clipped) && !snapshot.view_ends->has_value() && !models_move();
   };
   if (present_.empty() || stands_alone()) {
     if (instances_) {
@@ -168,7 +170,8 @@ void GpuScene::update_instances(const scene::Snapshot& snapshot, const Wanted& w
                          .grid = grid,
                          .medium = medium_of(*volume.medium, *volume.source, extent),
                          .ends = volume.transform.ends,
-                         .emissive = *data()->emissive(*volume.source)});
+                         .emissive = *data()->emissive(*volume.source),
+                         .clip = volume.clip});
   }
   const bool of_other_data = instances_ && instances_.of().data != data_revision_;
   const auto same = [](const scene::Volume& a, const scene::Volume& b) { return a.id == b.id && a.source == b.source; };

@@ -214,7 +214,8 @@ class GpuScene {
     Revision<MarchData> data;
     bool operator==(const InstancesOf&) const = default;
   };
-  Slot<InstanceData, InstancesOf> instances_;  // if there are several volumes, a holdout, or anything that moves
+  Slot<InstanceData, InstancesOf>
+      instances_;  // if there are several volumes, a holdout, a clip, or anything that moves
   Revision<InstanceData> instances_revision_;
   struct AnalyticLightsOf {
     scene::Part<light::AnalyticLights> host;

@@ -37,6 +37,7 @@ InstanceData InstanceData::make(const gl::FunctionsPtr& gl, const gl::Limits& li
     data.medium_.anisotropic |= instance.medium.anisotropic;
     data.medium_.changes |= instance.medium.changes;
   }
+  data.clips_ = std::ranges::any_of(table.records, [](const core::CmInstance& record) { return record.clip != 0; });
   data.moves_ = !table.ends.empty() || data.medium_.changes != 0;
   data.emissive_power_ = table.emissive_power;
   data.emissive_length_ = table.emissive_length;

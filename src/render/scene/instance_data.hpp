@@ -29,6 +29,8 @@ class InstanceData {
   [[nodiscard]] double emissive_length() const { return emissive_length_; }
   /// True if any instance moves while the shutter is open.
   [[nodiscard]] bool moves() const { return moves_; }
+  /// True if any instance is clipped.
+  [[nodiscard]] bool clips() const { return clips_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
@@ -40,6 +42,7 @@ class InstanceData {
   double emissive_power_ = 0.0;
   double emissive_length_ = 0.0;
   bool moves_ = false;
+  bool clips_ = false;
   std::uint64_t bytes_ = 0;
 };
 
