@@ -40,7 +40,7 @@ static_assert(std::ranges::equal(
 // The filter's guides need not be better than its samples, and rays would take longer than more samples, for less
 // benefit. A network expects guides without noise.
 std::uint32_t rays_to_denoise(const render::Picture& picture, bool by_network) {
-  constexpr std::uint32_t min_filter_rays = 4;
+  constexpr std::uint32_t min_filter_rays = 8;
   const std::uint32_t least = by_network ? render::feature_rays : min_filter_rays;
   return static_cast<std::uint32_t>(
       std::clamp<std::uint64_t>(2 * picture.samples_per_pixel(), least, render::max_feature_rays));

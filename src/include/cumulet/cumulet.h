@@ -4029,7 +4029,7 @@ typedef struct cumulet_denoise_desc {
  *   and the positive and the negative residual are denoised separately.
  * - Without a network: the filter also denoises alpha. It takes 128 bytes per pixel, and one or two seconds per
  *   megapixel on software drivers.
- * - Both first trace feature rays, three of which take about as long as a sample: two per sample, at least 4 per pixel
+ * - Both first trace feature rays, three of which take about as long as a sample: two per sample, at least 8 per pixel
  *   (16 with a network) and at most 64. Rays beyond 16 are traced only where they differ.
  *
  * Threads: any thread with the context.
