@@ -78,6 +78,7 @@ class Instances {
     std::shared_ptr<cumulet_sequence> sequence;  // keeps desc.sequence alive
     cumulet_medium_desc medium{};                // the value of desc.medium
     decltype(SceneVolume::ramps) ramps;
+    settings::Clip clip;
     Indices indices;
   };
 

@@ -557,6 +557,8 @@ class Studio {
       check(viewer_, cumulet_set_ramp(viewer_.get(), static_cast<cumulet_ramp>(i),
                                       cumulet::settings::numbers_of(points), points.size()));
     }
+    const cumulet_clip_desc clip = cumulet::settings::clip_desc_of(scene.clip);
+    check(viewer_, cumulet_set_clip(viewer_.get(), &clip));
     // The ground is set first, because the sky is computed for it.
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_sun_sky(viewer_.get(), &scene.light));

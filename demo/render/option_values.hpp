@@ -30,6 +30,8 @@ void parse_camera(std::string_view text, cumulet_camera_desc& camera);
 void parse_sun(std::string_view text, cumulet_sun_sky_desc& light);
 void parse_sky_model(std::string_view text, cumulet_sun_sky_desc& light);
 [[nodiscard]] settings::RampPoints parse_ramp(std::string_view text);
+[[nodiscard]] std::optional<settings::ClipBox> parse_clip_box(std::string_view text);
+[[nodiscard]] std::vector<settings::ClipPlane> parse_clip_planes(std::string_view text);
 [[nodiscard]] std::vector<std::string> parse_light_groups(std::string_view text);
 
 [[nodiscard]] std::string in_quotes(std::string_view text);
