@@ -178,6 +178,11 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
             "");
       shown.color_ramps[i] = scene.color_ramps[i];
     }
+    if (shown.clip != scene.clip) {
+      const cumulet_clip_desc clip = settings::clip_desc_of(scene.clip);
+      check(cumulet_instance_set_clip(shown.instance.get(), &clip), "");
+      shown.clip = scene.clip;
+    }
   };
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const SceneVolume& scene = volumes[i];

@@ -79,6 +79,7 @@ class Instances {
     cumulet_medium_desc medium{};                // the value of desc.medium
     decltype(SceneVolume::ramps) ramps;
     decltype(SceneVolume::color_ramps) color_ramps;
+    settings::Clip clip;
     Indices indices;
   };
 

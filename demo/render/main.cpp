@@ -555,6 +555,8 @@ class Studio {
     check(viewer_, cumulet_set_grid(viewer_.get(), &scene.grid));
     check(viewer_, cumulet_set_medium(viewer_.get(), &scene.medium));
     check(viewer_, cumulet::demo::set_ramps(viewer_.get(), scene));
+    const cumulet_clip_desc clip = cumulet::settings::clip_desc_of(scene.clip);
+    check(viewer_, cumulet_set_clip(viewer_.get(), &clip));
     // The ground is set first, because the sky is computed for it.
     check(viewer_, cumulet_set_ground(viewer_.get(), &scene.ground));
     check(viewer_, cumulet_set_sun_sky(viewer_.get(), &scene.light));

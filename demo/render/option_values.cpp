@@ -181,6 +181,29 @@ settings::ColorStops parse_color_ramp(const settings::ColorRampInfo& info, std::
   return stops;
 }
 
+std::optional<settings::ClipBox> parse_clip_box(std::string_view text) {
+  if (text == "none") return std::nullopt;
+  settings::ClipBox box{};
+  std::ranges::copy(parse_numbers(text, box.size()), box.begin());
+  if (const std::string why = settings::clip_box_refusal(box); !why.empty()) throw UsageError("the box " + why);
+  return box;
+}
+
+std::vector<settings::ClipPlane> parse_clip_planes(std::string_view text) {
+  std::vector<settings::ClipPlane> planes;
+  if (text == "none") return planes;
+  for (const std::string_view word : words(text)) {
+    settings::ClipPlane& plane = planes.emplace_back();
+    std::ranges::copy(parse_numbers(word, plane.size()), plane.begin());
+    if (const std::string why = settings::clip_plane_refusal(plane); !why.empty())
+      throw UsageError("plane " + in_quotes(word) + " " + why);
+  }
+  if (planes.empty()) throw UsageError(in_quotes(text) + " has no plane");
+  if (const std::string why = settings::clip_count_refusal(planes.size()); !why.empty())
+    throw UsageError(in_quotes(text) + " " + why);
+  return planes;
+}
+
 std::vector<std::string> parse_light_groups(std::string_view text) {
   std::vector<std::string> names;
   if (text == "none") return names;

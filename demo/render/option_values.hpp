@@ -32,6 +32,8 @@ void parse_sky_model(std::string_view text, cumulet_sun_sky_desc& light);
 [[nodiscard]] settings::RampPoints parse_ramp(std::string_view text);
 /// Parses stops of a value and a color: "0:#ff8000,1:1/0.5/0", in sRGB or linear Rec. 709.
 [[nodiscard]] settings::ColorStops parse_color_ramp(const settings::ColorRampInfo& info, std::string_view text);
+[[nodiscard]] std::optional<settings::ClipBox> parse_clip_box(std::string_view text);
+[[nodiscard]] std::vector<settings::ClipPlane> parse_clip_planes(std::string_view text);
 [[nodiscard]] std::vector<std::string> parse_light_groups(std::string_view text);
 
 [[nodiscard]] std::string in_quotes(std::string_view text);

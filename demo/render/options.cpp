@@ -204,6 +204,16 @@ void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
            "Velocity grid, for --aovs velocity and --shutter; none: not used (default: found by name)");
   add_choice(app, group, "--up", up_names, scene.up,
              "Up axis of the volume (default: y; use z for Blender and Mantaflow)");
+  add(
+      app, group, "--clip-box", "X0,Y0,Z0,X1,Y1,Z1|none",
+      [&scene](const std::string& text) { scene.clip.box = parse_clip_box(text); },
+      "Show only the part of the volume in this box: its lowest and its highest corner, in the volume's world units "
+      "before its transforms, as --info prints its bounds (default: none)");
+  add(
+      app, group, "--clip-planes", "\"A,B,C,D ...\"|none",
+      [&scene](const std::string& text) { scene.clip.planes = parse_clip_planes(text); },
+      "Show only the part of the volume where a x + b y + c z + d >= 0, for up to 6 planes, in the same units "
+      "(default: none)");
 }
 
 void add_surface_options(CLI::App& app, const char* group, SceneOptions& scene) {

@@ -3,6 +3,7 @@
 #include <cumulet/cumulet.h>
 
 #include <array>
+#include <clip.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <frame_row.hpp>
@@ -72,7 +73,8 @@ struct SceneVolume : VolumeFile {
   cumulet_medium_desc medium{};
   std::array<settings::RampPoints, settings::ramps.size()> ramps;              // indexed by cumulet_ramp
   std::array<settings::ColorStops, settings::color_ramps.size()> color_ramps;  // indexed by cumulet_ramp
-  SceneSequence sequence;                                                      // for a volume that is a sequence
+  settings::Clip clip;             // in the world space of the file, after to_world
+  SceneSequence sequence;          // for a volume that is a sequence
   bool auto_density_scale = true;  // medium.density_scale is derived from the volume when it is loaded
 
   SceneVolume();

@@ -250,6 +250,30 @@ class Reader {
     if (!why.empty()) wrong(info.key, why);
   }
 
+  /// of: "volume."
+  void clip(const std::string& of, settings::Clip& out) {
+    const auto accept = [&](const std::string& key, const std::string& why) {
+      if (!why.empty()) wrong(key, why);
+    };
+    const std::string box = of + "clip.box";
+    settings::ClipBox corners{};
+    if (numbers(box, std::span<double>(corners), "six numbers")) {
+      accept(box, settings::clip_box_refusal(corners));
+      out.box = corners;
+    }
+    const std::string planes = of + "clip.planes";
+    const std::optional<Json> value = take(planes);
+    if (!value) return;
+    if (!value->is_array()) wrong(planes, "is not a list of planes");
+    accept(planes, settings::clip_count_refusal(value->size()));
+    for (const Json& one : *value) {
+      settings::ClipPlane& plane = out.planes.emplace_back();
+      const std::string where = planes + '[' + std::to_string(out.planes.size() - 1) + ']';
+      take_numbers(where, one, std::span<double>(plane), "four numbers", {});
+      accept(where, settings::clip_plane_refusal(plane));
+    }
+  }
+
   [[nodiscard]] bool has(const std::string& key) { return find(key).value != nullptr; }
 
   [[noreturn]] void wrong(const std::string& key, const std::string& cause) const {
@@ -518,6 +542,7 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   read_transform(reader, "volume.", volume.to_world);
   reader.transforms("volume.transforms", volume.transforms);
   read_shutter(reader, "volume.", volume.shutter);
+  reader.clip("volume.", volume.clip);
   reader.text("volume.name", volume.name);
   volume.visible = read_visible(reader, "volume.");
 }

@@ -178,6 +178,8 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
     if (volume.to_world != Matrix{}) writer.put("volume.to_world", volume.to_world);
     if (!volume.transforms.empty()) writer.put("volume.transforms", volume.transforms);
     put_shutter(writer, "volume.", volume.shutter);
+    if (volume.clip.box) writer.put("volume.clip.box", *volume.clip.box);
+    if (!volume.clip.planes.empty()) writer.put("volume.clip.planes", volume.clip.planes);
     if (!volume.visible) writer.put("volume.visible", false);
   }
   writer.put_text("medium.temperature_grid", volume.temperature_grid);

@@ -259,6 +259,24 @@ TEST(Options, ColorRampIsAListOfColors) {
             std::string::npos);
 }
 
+TEST(Options, ClipIsABoxAndPlanes) {
+  const auto clip = parse({"--clip-box", "-1,-2,.5,3,4,1e3", "--clip-planes", "0,1,0,-2.5  -1,0,1,0"}).scene.clip;
+  EXPECT_EQ(clip.box, (cumulet::settings::ClipBox{-1.0, -2.0, 0.5, 3.0, 4.0, 1e3}));
+  EXPECT_EQ(clip.planes, (std::vector<cumulet::settings::ClipPlane>{{0.0, 1.0, 0.0, -2.5}, {-1.0, 0.0, 1.0, 0.0}}));
+  EXPECT_TRUE(parse({"--clip-box", "none", "--clip-planes", "none"}).scene.clip.empty());
+  EXPECT_EQ(usage_error(with({"--clip-box", "0,0,1,1,1,1"})),
+            "--clip-box: the box is empty: each number of its lowest corner must be below that of its highest corner");
+  EXPECT_EQ(usage_error(with({"--clip-planes", "1,0,0,1 0,0,0,1"})),
+            "--clip-planes: plane '0,0,0,1' has no direction: its first three numbers are 0");
+  for (const char* box : {"", "0,0,0,1,1", "0,0,0,1,1,nan", "0,0,0,1e31,1,1"})
+    EXPECT_TRUE(usage_error(with({"--clip-box", box})).starts_with("--clip-box: ")) << box;
+  for (const char* planes : {"", "1,0,0", "1,0,0,1,1,0,0,2", "1,0,0,1e31"})
+    EXPECT_TRUE(usage_error(with({"--clip-planes", planes})).starts_with("--clip-planes: ")) << planes;
+  EXPECT_NE(usage_error(with({"--clip-planes", "1,0,0,1 1,0,0,1 1,0,0,1 1,0,0,1 1,0,0,1 1,0,0,1 1,0,0,1"}))
+                .find("has 7 planes; it must have at most 6"),
+            std::string::npos);
+}
+
 TEST(Options, ViewNames) {
   EXPECT_EQ(parse({"--view", "wireframe"}).scene.sampling.view, CUMULET_VIEW_WIREFRAME);
   EXPECT_EQ(parse({"--view", "cells"}).scene.sampling.view, CUMULET_VIEW_CELLS);

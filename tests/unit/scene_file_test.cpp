@@ -51,6 +51,8 @@ SceneOptions full_scene() {
   scene.ramps[CUMULET_RAMP_FLAME] = {{0.0f, 2.0f}, {1.0f, 0.0f}};
   scene.color_ramps[CUMULET_RAMP_DENSITY] = {{-0.5f, 0.0f, 1.0f / 3.0f, 1.0f}, {0.1f, 1.0f, 0.0f, 1e-9f}};
   scene.color_ramps[CUMULET_RAMP_TEMPERATURE] = {{0.0f, 0.0f, 0.0f, 0.0f}, {3.0f, 1e30f, 2.0f, 0.1f}};
+  scene.clip.box = {-1.0, 0.1, -2e30 / 3.0, 1.0 / 3.0, 5.0, 1e30};
+  scene.clip.planes = {{1.0, 0.5, -0.1, 1.0 / 3.0}, {0.0, 0.0, -1.0, 7.0}};
   for (int i = 0; i < 3; ++i) scene.medium.emission[i] = 3.3f * static_cast<float>(i);
   scene.light.sun_azimuth_degrees = -123.4f;
   scene.light.sun_elevation_degrees = -5.6f;
@@ -107,6 +109,7 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.medium, scene.medium));
   EXPECT_EQ(read.ramps, scene.ramps);
   EXPECT_EQ(read.color_ramps, scene.color_ramps);
+  EXPECT_EQ(read.clip, scene.clip);
   EXPECT_TRUE(same(read.light, scene.light));
   EXPECT_TRUE(std::ranges::equal(read.analytic_lights, scene.analytic_lights, same<cumulet_light_desc>));
   EXPECT_EQ(read.to_world, scene.to_world);
@@ -143,6 +146,7 @@ TEST(SceneFile, SupportsAnyNumberOfVolumes) {
   smoke.transforms.assign(3, scene.to_world);
   smoke.ramps[CUMULET_RAMP_DENSITY] = {{0.0f, 0.0f}, {1.0f, 2.0f}};
   smoke.color_ramps[CUMULET_RAMP_FLAME] = {{0.0f, 0.0f, 1.0f, 2.0f}, {1.0f, 2.0f, 1.0f, 0.0f}};
+  smoke.clip.planes = {{0.0, 1.0, 0.0, -2.5}};
   SceneVolume& fire = scene.others.emplace_back();
   fire.volume = "/elsewhere/fire.vdb";
   fire.flame_grid = "none";
@@ -167,6 +171,7 @@ TEST(SceneFile, SupportsAnyNumberOfVolumes) {
     EXPECT_EQ(a.transforms, b.transforms);
     EXPECT_EQ(a.ramps, b.ramps);
     EXPECT_EQ(a.color_ramps, b.color_ramps);
+    EXPECT_EQ(a.clip, b.clip);
     EXPECT_EQ(a.auto_density_scale, b.auto_density_scale);
     EXPECT_EQ(a.medium.density_scale, b.medium.density_scale);
     EXPECT_EQ(a.medium.anisotropy, b.medium.anisotropy);
@@ -221,6 +226,8 @@ TEST(SceneFile, EveryDifferenceIsDetected) {
   EXPECT_TRUE(differs([](SceneOptions& s) { s.color_ramps[CUMULET_RAMP_DENSITY][1][2] = 0.5f; }));
   EXPECT_TRUE(differs(
       [](SceneOptions& s) { std::swap(s.color_ramps[CUMULET_RAMP_FLAME], s.color_ramps[CUMULET_RAMP_TEMPERATURE]); }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { (*s.clip.box)[4] = 5.5; }));
+  EXPECT_TRUE(differs([](SceneOptions& s) { s.clip.planes.pop_back(); }));
   EXPECT_TRUE(
       differs([](SceneOptions& s) { std::swap(s.ramps[CUMULET_RAMP_FLAME], s.ramps[CUMULET_RAMP_TEMPERATURE]); }));
   EXPECT_FALSE(differs([](SceneOptions&) {}));
@@ -387,6 +394,7 @@ TEST(SceneFile, VersionTwoMatchesVersionOne) {
   scene.analytic_lights.clear();
   scene.to_world = {};
   scene.transforms.clear();
+  scene.clip = {};
   EXPECT_EQ(first.rfind("{\n  \"cumulet_scene\": 1,\n  \"volume\"", 0), 0u) << first;
   EXPECT_TRUE(same_scene(parse_scene(first, "s.json"), scene));
   const std::string second = scene_text(scene, "s.json", SceneFormat::second);
@@ -537,6 +545,12 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(section_error(R"("volumes": [{"medium": {"x": 1}}])"),
             start + "volumes[0].medium.x: there is no such setting");
   EXPECT_EQ(section_error(R"("volumes": [{"to_world": [1]}])"), start + "volumes[0].to_world: is not 16 numbers");
+  EXPECT_EQ(section_error(R"("volumes": [{"clip": {"box": [0, 0, 0, 1, 1]}}])"),
+            start + "volumes[0].clip.box: is not six numbers");
+  EXPECT_EQ(section_error(R"("volumes": [{"clip": {"planes": [[1, 0, 0, 2], [0, 0, 0, 1]]}}])"),
+            start + "volumes[0].clip.planes[1]: has no direction: its first three numbers are 0");
+  EXPECT_EQ(section_error(R"("volumes": [{"clip": {"sphere": 1}}])"),
+            start + "volumes[0].clip.sphere: there is no such setting");
   EXPECT_EQ(section_error(R"("volumes": [{"scale": [1, 0, 1]}])"), start + "volumes[0].scale: 0 is not above 0");
   EXPECT_EQ(section_error(R"("volumes": [{"to_world": [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1], "scale": [1, 1, 1]}])"),
             start + "volumes[0].to_world: cannot be combined with translate, rotate_degrees or scale");
