@@ -5,128 +5,22 @@
 #include <imgui_internal.h>
 
 #include <algorithm>
-#include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <set>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "menus.hpp"
 #include "model.hpp"
 #include "panel.hpp"
+#include "panel_fixture.hpp"
 #include "rows.hpp"
 #include "selection.hpp"
-#include "support/folder.hpp"
 
 namespace {
 
 using namespace cumulet::demo;
-
-/// The panel without a window: ImGui computes the layout, and nothing is drawn.
-class PanelTest : public ::testing::TestWithParam<std::pair<float, ImVec2>> {
- public:
-  PanelTest(const PanelTest&) = delete;
-  PanelTest& operator=(const PanelTest&) = delete;
-
- protected:
-  PanelTest() {
-    ImGui::CreateContext();
-    ImGuiIO& io = ImGui::GetIO();
-    io.IniFilename = nullptr;
-    io.DisplaySize = GetParam().second;
-    apply_theme(GetParam().first);
-    load_fonts(GetParam().first);
-    unsigned char* pixels = nullptr;
-    int width = 0;
-    int height = 0;
-    io.Fonts->GetTexDataAsAlpha8(&pixels, &width, &height);
-    model_.status.has_volume = model_.status.has_content = true;
-    model_.status.stats.gl_renderer[0] = 'x';
-    model_.status.stats.samples = model_.status.stats.steps = 1;
-    model_.grids = {{"density", "float", ""}, {"velocity", "vec3s", "not a scalar"}};
-    model_.preferences.recent = {"/a/cloud.vdb"};
-    model_.scene.environment = "/a/sky.hdr";
-    model_.thumbnail_texture = 1;
-    for (const cumulet_light_kind kind : {CUMULET_LIGHT_SPOT, CUMULET_LIGHT_RECT}) {
-      model_.scene.analytic_lights.emplace_back().struct_size = sizeof(cumulet_light_desc);
-      model_.scene.analytic_lights.back().kind = kind;
-    }
-    spell_out_defaults(model_.scene);
-  }
-  ~PanelTest() override { ImGui::DestroyContext(); }
-
-  void frame(const ImVec2& mouse = {-1.0f, -1.0f}) {
-    ImGuiIO& io = ImGui::GetIO();
-    io.DeltaTime = 1.0f / 60.0f;
-    io.MousePos = mouse;
-    time_ += 1.0 / 60.0;
-    ImGui::NewFrame();
-    panel_.draw(model_, GetParam().first, time_, commands_);
-    ImGui::Render();
-  }
-
-  void check_controls() {
-    const auto& controls = panel_.ui().controls();
-    const std::set<std::string> without_tip = {"File",      "Edit",     "View",       "Render",        "Help",
-                                               "Image",     "Sampling", "Advanced",   "Model",         "Triangles",
-                                               "Grid data", "Levels",   "Cell count", "Active voxels", "OpenColorIO"};
-    EXPECT_GT(controls.size(), 20u);
-    const ImVec2 screen = ImGui::GetIO().DisplaySize;
-    for (const auto& [name, control] : controls) {
-      EXPECT_EQ(control.has_tip, !without_tip.contains(name)) << name;
-      const Rectangle& a = control.rectangle;
-      EXPECT_GE(a.x, 0.0) << name;
-      EXPECT_LE(a.x + a.width, static_cast<double>(screen.x) + 0.5) << name;
-      EXPECT_GT(a.width, 2.0) << name;
-      for (const auto& [other, control_b] : controls) {
-        const Rectangle& b = control_b.rectangle;
-        const bool apart =
-            a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
-        // The toolbar is fixed; scrolled controls pass below it.
-        if (name < other && control.in_view && control_b.in_view) {
-          EXPECT_TRUE(apart) << name << " and " << other;
-        }
-      }
-    }
-  }
-
-  /// Clicks the middle of a control.
-  void click(const std::string& label, ImGuiMouseButton button = ImGuiMouseButton_Left) {
-    const auto rectangle = panel_.ui().find(label);
-    ASSERT_TRUE(rectangle) << label;
-    const ImVec2 middle(static_cast<float>(rectangle->x + rectangle->width / 2),
-                        static_cast<float>(rectangle->y + rectangle->height / 2));
-    frame(middle);
-    ImGui::GetIO().MouseDown[button] = true;
-    frame(middle);
-    ImGui::GetIO().MouseDown[button] = false;
-    frame(middle);
-    frame(middle);
-  }
-
-  void drag_mouse(const ImVec2& from, const ImVec2& to) {
-    frame(from);
-    ImGui::GetIO().MouseDown[0] = true;
-    frame(from);
-    constexpr int steps = 6;
-    for (int i = 1; i <= steps; ++i) {
-      const float part = static_cast<float>(i) / steps;
-      frame({from.x + (to.x - from.x) * part, from.y + (to.y - from.y) * part});
-    }
-    frame(to);
-    ImGui::GetIO().MouseDown[0] = false;
-    frame(to);
-    frame(to);
-  }
-
-  Model model_;
-  Panel panel_;
-  std::vector<Command> commands_;
-  double time_ = 1.0;
-};
+using cumulet::test::PanelTest;
 
 TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnArea) {
   model_.scene.volume = "/a/cloud.vdb";
@@ -208,58 +102,6 @@ TEST_P(PanelTest, DrawingChangesNothing) {
   const SceneOptions before = model_.scene;
   for (int i = 0; i < 5; ++i) frame();
   EXPECT_TRUE(same_scene(before, model_.scene));
-  EXPECT_TRUE(commands_.empty());
-}
-
-TEST_P(PanelTest, DialogListsOnlyItsFileTypes) {
-  model_.preferences.recent = {"/a/cloud.vdb", "/a/sky.HDR", "/a/town.glb"};
-  const auto offers = [&](const char* name) { return panel_.ui().controls().contains(std::string("Recent/") + name); };
-  panel_.dialog().open("Open environment map", Action::open, {".hdr", ".exr"}, "");
-  for (int i = 0; i < 3; ++i) frame();
-  EXPECT_TRUE(offers("sky.HDR"));
-  EXPECT_FALSE(offers("cloud.vdb") || offers("town.glb"));
-  panel_.dialog().open("Add volume", Action::add_volume, {".vdb", ".nvdb"}, "");
-  for (int i = 0; i < 3; ++i) frame();
-  EXPECT_TRUE(offers("cloud.vdb")) << "what is added is opened, not saved";
-  EXPECT_FALSE(offers("sky.HDR"));
-}
-
-TEST_P(PanelTest, DialogIsTheDesktopsOrElseTheOwn) {
-  const cumulet::test::Folder folder;
-  const auto script = [&](const std::string& text) {
-    const auto path = folder / "dialog";
-    std::ofstream(path) << "#!/bin/sh\n" << text << "\n";
-    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
-    return path.string();
-  };
-  const auto until_it_ends = [&] {
-    for (int i = 0; i < 6000 && panel_.dialog().waits(); ++i) {
-      frame();
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    frame();
-  };
-  const std::string cloud = (folder / "cloud.vdb").string();
-  std::ofstream(cloud) << "x";
-  panel_.dialog().use_desktop(script("echo " + cloud), "");
-  panel_.dialog().open("Open", Action::open, {".vdb"}, folder.path().string());
-  EXPECT_TRUE(panel_.dialog().is_open());
-  until_it_ends();
-  ASSERT_EQ(commands_.size(), 1u);
-  EXPECT_EQ(commands_[0].text, cloud);
-  EXPECT_FALSE(panel_.dialog().is_open());
-
-  commands_.clear();
-  panel_.dialog().use_desktop(script("exit 1"), "");
-  panel_.dialog().open("Open", Action::open, {".vdb"}, folder.path().string());
-  until_it_ends();
-  EXPECT_FALSE(panel_.dialog().is_open()) << "the user has closed it";
-
-  panel_.dialog().use_desktop(script("echo no portal >&2; exit 3"), "");
-  panel_.dialog().open("Open", Action::open, {".vdb"}, folder.path().string());
-  until_it_ends();
-  frame();
-  EXPECT_TRUE(panel_.ui().controls().contains("cloud.vdb")) << "the own dialog is shown";
   EXPECT_TRUE(commands_.empty());
 }
 
@@ -514,58 +356,6 @@ TEST_P(PanelTest, ShiftDragsSlowly) {
   EXPECT_NEAR(fine, 0.1f * normal, 0.03f * normal);
 }
 
-TEST_P(PanelTest, MessagesHaveTheirButtons) {
-  show_message(model_, false, "a.vdb: Z is up", 1.0, MessageButton{"Y up", "Stands it on Y.", {Action::choose_up}});
-  for (int i = 0; i < 3; ++i) frame();
-  const Rectangle toast = *panel_.ui().find("Message");
-  const Rectangle view = Panel::viewport(model_, static_cast<double>(ImGui::GetIO().DisplaySize.x),
-                                         static_cast<double>(ImGui::GetIO().DisplaySize.y), GetParam().first);
-  EXPECT_LE(toast.x + toast.width, view.x + view.width);
-  click("Message/Y up");
-  ASSERT_EQ(commands_.size(), 2u);
-  EXPECT_EQ(commands_[0].action, Action::choose_up);
-  EXPECT_EQ(commands_[1].action, Action::dismiss);
-  EXPECT_EQ(commands_[1].text, "a.vdb: Z is up");
-  model_.log_open = true;
-  for (int i = 0; i < 3; ++i) frame();
-  EXPECT_TRUE(panel_.ui().controls().contains("Clear log"));
-}
-
-TEST_P(PanelTest, RenderDialogStartsAPicture) {
-  const cumulet::test::Folder folder;
-  model_.preferences.folder = folder.path().string();
-  model_.scene.volume = "/a/cloud.vdb";
-  model_.scene.sampling.samples = 32;
-  panel_.render_dialog().open(model_);
-  EXPECT_TRUE(panel_.dialog_open());
-  for (int i = 0; i < 3; ++i) frame();
-  EXPECT_EQ(panel_.render_dialog().settings().samples, 32u);
-  EXPECT_EQ(panel_.render_dialog().settings().file.path, (folder / "cloud-001.png").string());
-  EXPECT_FALSE(panel_.ui().controls().contains("First frame")) << "nothing plays";
-  EXPECT_FALSE(panel_.ui().controls().contains("Layer/normal")) << "a PNG has no layers";
-  panel_.ui().bring_into_view("Start render");
-  for (int i = 0; i < 4; ++i) frame();
-  click("Start render");
-  ASSERT_EQ(commands_.size(), 1u);
-  EXPECT_EQ(commands_[0].action, Action::render);
-  frame();
-  EXPECT_FALSE(panel_.dialog_open());
-}
-
-TEST_P(PanelTest, RenderQueueIsListed) {
-  model_.renders_open = true;
-  model_.renders = {{1, "/a/one.png", RenderEntry::State::done, 1.0, {}, "1920x1080 in 0:12"},
-                    {2, "/a/two.png", RenderEntry::State::running, 0.5, 10.0, "128 / 256 samples"}};
-  for (int i = 0; i < 4; ++i) frame();
-  click("Render 2/Cancel");
-  ASSERT_EQ(commands_.size(), 1u);
-  EXPECT_EQ(commands_[0].action, Action::cancel_render);
-  EXPECT_EQ(commands_[0].text, "2");
-  click("Render 1/Show in folder");
-  ASSERT_EQ(commands_.size(), 2u);
-  EXPECT_EQ(commands_[1].text, "/a/one.png");
-}
-
 TEST_P(PanelTest, EdgeChangesTheWidth) {
   frame();
   frame();
@@ -592,11 +382,7 @@ TEST_P(PanelTest, EdgeChangesTheWidth) {
   EXPECT_EQ(model_.preferences.panel_width, 480.0f);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scales, PanelTest,
-                         ::testing::Values(std::make_pair(1.0f, ImVec2(1440, 900)),
-                                           std::make_pair(2.0f, ImVec2(1680, 1040)),
-                                           std::make_pair(1.0f, ImVec2(640, 400)),
-                                           std::make_pair(1.25f, ImVec2(1024, 3000))));
+INSTANTIATE_TEST_SUITE_P(Scales, PanelTest, cumulet::test::panel_sizes());
 
 TEST(Menus, ReachEveryAction) {
   // Actions of dialogs, messages, of the outliner and of Escape.
@@ -604,7 +390,8 @@ TEST(Menus, ReachEveryAction) {
       Action::add_volume,      Action::add_model, Action::save_scene_as,  Action::save_png,    Action::save_exr,
       Action::discard_changes, Action::recover,   Action::cancel,         Action::choose_grid, Action::discard_recovery,
       Action::clear_log,       Action::render,    Action::show_in_folder, Action::quit_anyway, Action::cancel_render,
-      Action::clear_renders,   Action::daylight,  Action::open_sample,    Action::ocio_dialog, Action::open_ocio};
+      Action::clear_renders,   Action::daylight,  Action::follow_light,   Action::open_sample, Action::ocio_dialog,
+      Action::open_ocio};
   for (int i = 0; i <= static_cast<int>(Action::daylight); ++i) {
     const auto action = static_cast<Action>(i);
     const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {

@@ -119,20 +119,6 @@ TEST(SceneFile, RoundTripsEverything) {
   EXPECT_TRUE(same(read.display, scene.display));
 }
 
-TEST(SceneFile, KeepsTheViewOfOpenColorIo) {
-  SceneOptions scene = full_scene();
-  scene.ocio = {.config = "/p/show/config.ocio", .display = "sRGB", .view = "Film \"A\"", .input = "lin"};
-  const auto again = [&](const std::string& path) { return parse_scene(scene_text(scene, path), path).ocio; };
-  EXPECT_EQ(again("/p/s.json"), scene.ocio);
-  EXPECT_NE(scene_text(scene, "/p/s.json").find("\"show/config.ocio\""), std::string::npos);
-  EXPECT_EQ(again("/q/s.json"), scene.ocio);
-  EXPECT_FALSE(same_scene(scene, full_scene()));
-  scene.ocio = {.config = "ocio://default"};
-  EXPECT_EQ(again("/p/s.json"), scene.ocio) << "no file";
-  EXPECT_THROW(static_cast<void>(parse_scene(with(R"("display": {"ocio": {"view": "Film"}})"), "s.json")),
-               std::runtime_error);
-}
-
 TEST(SceneFile, SupportsAnyNumberOfVolumes) {
   SceneOptions scene = full_scene();
   scene.name = "the large one";
@@ -587,20 +573,6 @@ TEST(SceneFile, VersionTwoErrorsNameTheKeyPath) {
   EXPECT_EQ(error_of(R"({"cumulet_scene": 4})"),
             start + "cumulet_scene: version 4 is not supported: this program reads 1 to 3");
   EXPECT_EQ(error_of(with(R"("lights": [])")), start + "lights: there is no such setting");
-}
-
-TEST(SceneFile, DefaultLightIsDaylight) {
-  const auto lit = [](const std::string& more) {
-    const SceneOptions scene = parse_scene(R"({"cumulet_scene": )" + more + "}", "s.json");
-    return scene.light.sky == CUMULET_SKY_PHYSICAL;
-  };
-  EXPECT_TRUE(lit("2"));
-  EXPECT_FALSE(lit(R"(2, "environment": {})"));
-  EXPECT_FALSE(lit(R"(2, "lights": [])"));
-  EXPECT_TRUE(lit("3"));
-  EXPECT_FALSE(lit(R"(3, "sun_sky": {})"));
-  EXPECT_FALSE(lit(R"(3, "environment": {})"));
-  EXPECT_FALSE(lit(R"(3, "lights": [])"));
 }
 
 TEST(SceneFile, FilesAreWrittenAtomically) {

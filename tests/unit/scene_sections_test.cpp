@@ -1,4 +1,4 @@
-// Sections of scene files: transforms, motion, cameras, sequences and models.
+// Sections of scene files: transforms, motion, cameras, sequences, models, light and the display.
 
 #include "scene_file.hpp"
 
@@ -38,6 +38,36 @@ TEST(SceneFile, TransformIsAMatrixOrTranslationRotationScale) {
   const cumulet_volume_file_desc file = volume_file(z_up);
   // The file's up axis z becomes y before the instance transform.
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(file.to_world[8 + i], expected[4 + i], 1e-12) << i;
+}
+
+TEST(SceneFile, KeepsTheViewOfOpenColorIo) {
+  SceneOptions scene;
+  scene.volume = "/a/cloud.vdb";
+  const SceneOptions without = scene;
+  scene.ocio = {.config = "/p/show/config.ocio", .display = "sRGB", .view = "Film \"A\"", .input = "lin"};
+  const auto again = [&](const std::string& path) { return parse_scene(scene_text(scene, path), path).ocio; };
+  EXPECT_EQ(again("/p/s.json"), scene.ocio);
+  EXPECT_NE(scene_text(scene, "/p/s.json").find("\"show/config.ocio\""), std::string::npos);
+  EXPECT_EQ(again("/q/s.json"), scene.ocio);
+  EXPECT_FALSE(same_scene(scene, without));
+  scene.ocio = {.config = "ocio://default"};
+  EXPECT_EQ(again("/p/s.json"), scene.ocio) << "no file";
+  EXPECT_THROW(static_cast<void>(parse_scene(with(R"("display": {"ocio": {"view": "Film"}})"), "s.json")),
+               std::runtime_error);
+}
+
+TEST(SceneFile, DefaultLightIsDaylight) {
+  const auto lit = [](const std::string& more) {
+    const SceneOptions scene = parse_scene(R"({"cumulet_scene": )" + more + "}", "s.json");
+    return scene.light.sky == CUMULET_SKY_PHYSICAL;
+  };
+  EXPECT_TRUE(lit("2"));
+  EXPECT_FALSE(lit(R"(2, "environment": {})"));
+  EXPECT_FALSE(lit(R"(2, "lights": [])"));
+  EXPECT_TRUE(lit("3"));
+  EXPECT_FALSE(lit(R"(3, "sun_sky": {})"));
+  EXPECT_FALSE(lit(R"(3, "environment": {})"));
+  EXPECT_FALSE(lit(R"(3, "lights": [])"));
 }
 
 TEST(SceneFile, MotionRoundTrips) {
