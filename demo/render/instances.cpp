@@ -152,7 +152,7 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
       check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
       std::shared_ptr<cumulet_instance> instance(made, cumulet_instance_release);
       check(cumulet_add_instance(viewer, made), cumulet_last_error(viewer));
-      shown_.push_back({std::move(instance), desc, open.volume, sequence, *desc.medium, {}, {}, indices});
+      shown_.push_back({std::move(instance), desc, open.volume, sequence, *desc.medium, {}, {}, {}, indices});
     }
     Shown& shown = shown_[count++];
     if (shown.volume != open.volume || shown.sequence != sequence || !settings::same(shown.medium, *desc.medium) ||

@@ -281,7 +281,7 @@ void Context::read_denoised(const Shot& shot, const Denoisers& by, float* rgba, 
     throw Error(ErrorCode::unsupported, "only shaded images with path-traced surfaces can be denoised");
   }
   require_floats(rgba, count, pixels_of(picture) * 4);
-  find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture, network != nullptr));
+  find_features(shot, picture, render::FeatureSet::guides, rays_to_denoise(picture, by.any()));
   const render::Display display = shot.display.shown(false);
   const gl::Object denoised = by.any() ? by_network(shot, picture, by) : filtered(picture, display.shows_background());
   const glm::uvec2 size = picture.size();
