@@ -206,6 +206,7 @@ class Session {
            opening_model_.made.valid();
   }
   void follow_ramps();
+  void follow_clip();
   void follow_analytic_lights();
   void follow_transforms();
   void follow_surfaces();
