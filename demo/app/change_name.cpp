@@ -101,6 +101,7 @@ std::string change_name(const SceneOptions& before, const SceneOptions& after) {
       setting_name(before.medium, after.medium, "Material"),
       before.ramps != after.ramps ? "Ramp" : "",
       before.color_ramps != after.color_ramps ? "Color ramp" : "",
+      before.clip != after.clip ? "Clip" : "",
       setting_name(before.light, after.light, "Sun & sky"),
       setting_name(before.environment_settings, after.environment_settings, "Environment"),
       setting_name(before.ground, after.ground, "Ground"),

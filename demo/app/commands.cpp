@@ -336,6 +336,7 @@ void App::open(const std::string& path) {
   } else {
     const UpAxis up = known_up_axis(path);
     set_volume(model_.scene, {.volume = path, .up = up});
+    model_.scene.clip = {};  // it is in the space of the volume before
     if (up == UpAxis::z) show_up_axis(path, "");
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();

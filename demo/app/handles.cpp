@@ -29,6 +29,7 @@ constexpr std::array handle_names = {"X", "Y", "Z", "YZ", "ZX", "XY", "free"};  
 constexpr ImU32 shade = IM_COL32(0, 0, 0, 110);
 constexpr ImU32 chosen_color = IM_COL32(255, 176, 64, 230);
 constexpr ImU32 analytic_light_color = IM_COL32(255, 238, 170, 200);
+constexpr ImU32 clip_color = IM_COL32(84, 206, 222, 230);
 constexpr ImU32 hot_color = IM_COL32(255, 226, 72, 255);
 
 ImVec2 vec(const dvec2& p) { return {static_cast<float>(p.x), static_cast<float>(p.y)}; }
@@ -101,7 +102,7 @@ class Pen {
   float scale_;
 };
 
-void draw_box(const Pen& pen, const dmat4& transform, const Box& box) {
+void draw_box(const Pen& pen, const dmat4& transform, const Box& box, ImU32 color = chosen_color) {
   const auto corner = [&](unsigned i) {
     const dvec3 at((i & 1U) != 0 ? box.most.x : box.least.x, (i & 2U) != 0 ? box.most.y : box.least.y,
                    (i & 4U) != 0 ? box.most.z : box.least.z);
@@ -109,7 +110,7 @@ void draw_box(const Pen& pen, const dmat4& transform, const Box& box) {
   };
   for (unsigned i = 0; i < 8; ++i)
     for (unsigned bit = 1; bit < 8; bit *= 2)
-      if ((i & bit) == 0) pen.line(corner(i), corner(i | bit), chosen_color, thin);
+      if ((i & bit) == 0) pen.line(corner(i), corner(i | bit), color, thin);
 }
 
 /// Draws the outline of a light: its size and the direction of its emission.
@@ -147,6 +148,32 @@ void draw_analytic_light(const Pen& pen, const cumulet_light_desc& analytic_ligh
     pen.line(at(0.0, 0.0, 0.0), at(0.0, 0.0, 0.7 * far), chosen_color, thin);
 }
 
+// The clip box of the selected volume and the volume's transform; nullopt if there are no handles of it.
+std::optional<std::pair<settings::ClipBox, dmat4>> clip_of(const Model& model) {
+  if (!model.chosen || model.chosen->kind != Item::Kind::volume || model.tool == Tool::none) return std::nullopt;
+  const auto transform = transform_of(model.scene, *model.chosen);
+  if (!transform) return std::nullopt;
+  const std::optional<settings::ClipBox>& box = volume_at(model.scene, model.chosen->index).clip.box;
+  return box ? std::optional(std::pair(*box, *transform)) : std::nullopt;
+}
+
+// Draws the outline of a clip box, and the handle of each face.
+void draw_clip(const Pen& pen, ImDrawList& list, const settings::ClipBox& box, const dmat4& transform,
+               const std::optional<ClipFace>& hot) {
+  draw_box(pen, transform, {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}}, clip_color);
+  constexpr float size = 5.0f;
+  for (const ClipFace& face : clip_faces) {
+    const auto at = pen.sight().project(center_of(face, box, transform));
+    if (!at || !can_be_dragged(face, box, transform, pen.sight())) continue;
+    const float half = size * pen.scale();
+    const ImVec2 middle = vec(*at);
+    const ImVec2 low(middle.x - half, middle.y - half);
+    const ImVec2 high(middle.x + half, middle.y + half);
+    list.AddRectFilled(low, high, face == hot ? hot_color : clip_color);
+    list.AddRect(low, high, shade);
+  }
+}
+
 void draw_handle(const Pen& pen, const Gizmo& gizmo, Handle handle, ImU32 color) {
   const std::vector<dvec2> shape = shape_of(gizmo, handle, pen.sight());
   if (shape.empty()) return;
@@ -168,6 +195,15 @@ std::optional<Gizmo> gizmo_of(const Model& model, float scale) {
 }  // namespace
 
 bool Handles::press(const Model& model, const Sight& sight, const dvec2& pixel, float scale) {
+  if (const auto clip = clip_of(model)) {
+    const auto& [box, transform] = *clip;
+    const auto face = clip_face_at(box, transform, sight, pixel, grasp_tolerance * static_cast<double>(scale));
+    if (face) {
+      held_face_.emplace(HeldFace{ClipDrag(*face, box, transform, sight, pixel), *model.chosen,
+                                  volume_at(model.scene, model.chosen->index).clip, pixel});
+      return true;
+    }
+  }
   const auto gizmo = gizmo_of(model, scale);
   if (!gizmo) return false;
   const auto handle = handle_at(*gizmo, sight, pixel, grasp_tolerance * static_cast<double>(scale));
@@ -177,7 +213,20 @@ bool Handles::press(const Model& model, const Sight& sight, const dvec2& pixel, 
   return true;
 }
 
+void Handles::drag_face(Model& model, const Sight& sight, const dvec2& pixel, bool snapped) {
+  if (!transform_of(model.scene, held_face_->item)) {
+    held_face_.reset();
+    return;
+  }
+  // A press without movement changes nothing.
+  if (pixel == held_face_->pixel && snapped == held_face_->snapped) return;
+  held_face_->pixel = pixel;
+  held_face_->snapped = snapped;
+  volume_at(model.scene, held_face_->item.index).clip.box = held_face_->drag.to(sight, pixel, snapped);
+}
+
 void Handles::drag(Model& model, const Sight& sight, const dvec2& pixel, bool snapped) {
+  if (held_face_) return drag_face(model, sight, pixel, snapped);
   if (!held_) return;
   if (!transform_of(model.scene, held_->item)) {
     held_.reset();
@@ -192,7 +241,9 @@ void Handles::drag(Model& model, const Sight& sight, const dvec2& pixel, bool sn
 
 void Handles::cancel(Model& model) {
   if (held_ && transform_of(model.scene, held_->item)) restore_transform(model.scene, held_->item, held_->before);
-  held_.reset();
+  if (held_face_ && transform_of(model.scene, held_face_->item))
+    volume_at(model.scene, held_face_->item.index).clip = held_face_->before;
+  release();
 }
 
 std::optional<Item> Handles::analytic_light_at(const Model& model, const Sight& sight, const dvec2& pixel,
@@ -211,6 +262,12 @@ std::optional<Item> Handles::analytic_light_at(const Model& model, const Sight& 
 }
 
 std::optional<Rectangle> Handles::find(const std::string& label, const Model& model, const Sight& sight, float scale) {
+  const auto clip = clip_of(model);
+  for (const ClipFace& face : clip_faces) {
+    if (!clip || label != "Handle " + name_of(face)) continue;
+    const auto at = sight.project(center_of(face, clip->first, clip->second));
+    return at ? std::optional(Rectangle{at->x, at->y, 0.0, 0.0}) : std::nullopt;
+  }
   const auto gizmo = gizmo_of(model, scale);
   if (!gizmo) return std::nullopt;
   for (const Handle handle : all_handles) {
@@ -251,12 +308,23 @@ void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, con
       if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, transform, *box);
     }
   }
+  std::optional<ClipFace> hot_face;
+  if (const auto clip = clip_of(model)) {
+    const auto& [box, transform] = *clip;
+    if (held_face_)
+      hot_face = held_face_->drag.face();
+    else if (pixel && !held_)
+      hot_face = clip_face_at(box, transform, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
+    draw_clip(pen, list, box, transform, hot_face);
+    const auto at = held_face_ ? sight.project(center_of(*hot_face, box, transform)) : std::nullopt;
+    if (at) pen.text(*at + 12.0 * static_cast<double>(scale), held_face_->drag.label());
+  }
   const auto gizmo = gizmo_of(model, scale);
   if (!gizmo) return;
   std::optional<Handle> hot;
   if (held_)
     hot = held_->drag.handle();
-  else if (pixel)
+  else if (pixel && !hot_face)
     hot = handle_at(*gizmo, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
   constexpr double back = 0.3;  // opacity of the handles that are not dragged
   for (const Handle handle : all_handles)

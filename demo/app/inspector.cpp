@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "clip_rows.hpp"
 #include "panel.hpp"
 #include "selection.hpp"
 
@@ -76,7 +77,10 @@ void Panel::volume(Model& model, const Item& item, std::vector<Command>& command
     else
       other_medium(shown);
   });
-  tab("Object", "Name and transform.", [&] { object(shown, item, commands); });
+  tab("Object", "Name, transform and clip.", [&] {
+    object(shown, item, commands);
+    clip_rows(ui_, shown.clip, box_of(model.scene, model.status.boxes, item));
+  });
   if (first) tab("Grids", "The grids of the file and its up axis.", [&] { grids(model, commands); });
   if (first && (model.status.play || model.status.neighbours))
     tab("Sequence", "Playback of numbered files.", [&] { sequence(model, commands); });

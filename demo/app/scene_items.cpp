@@ -14,11 +14,6 @@ using glm::dvec3;
 using glm::dvec4;
 using Numbers = std::array<double, 16>;
 
-/// Returns a volume of the scene; index 0 is the first volume.
-const SceneVolume& volume_at(const SceneOptions& scene, std::size_t index) {
-  return index == 0 ? static_cast<const SceneVolume&>(scene) : scene.others[index - 1];
-}
-
 bool has(const SceneOptions& scene, const Item& item) {
   switch (item.kind) {
     case Item::Kind::volume:
@@ -100,6 +95,10 @@ std::string kind_name(cumulet_light_kind kind) {
 
 SceneVolume& volume_at(SceneOptions& scene, std::size_t index) {
   return index == 0 ? static_cast<SceneVolume&>(scene) : scene.others[index - 1];
+}
+
+const SceneVolume& volume_at(const SceneOptions& scene, std::size_t index) {
+  return index == 0 ? static_cast<const SceneVolume&>(scene) : scene.others[index - 1];
 }
 
 std::vector<Item> listed_items(const SceneOptions& scene) {

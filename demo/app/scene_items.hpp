@@ -30,6 +30,7 @@ using Subject = std::variant<Part, Item>;
 
 /// Returns a volume of the scene; index 0 is the first volume.
 [[nodiscard]] SceneVolume& volume_at(SceneOptions& scene, std::size_t index);
+[[nodiscard]] const SceneVolume& volume_at(const SceneOptions& scene, std::size_t index);
 /// Returns all items, also the lights without a position.
 [[nodiscard]] std::vector<Item> listed_items(const SceneOptions& scene);
 /// Returns all items that can be moved, in the order of the panel.

@@ -30,7 +30,7 @@ constexpr double patience = 1.0;  // seconds to wait for the volume before surfa
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
     return std::tie(volume.name, volume.visible, volume.transforms, volume.shutter, volume.ramps, volume.color_ramps,
-                    volume.auto_density_scale, volume.sequence);
+                    volume.clip, volume.auto_density_scale, volume.sequence);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
 }
@@ -131,6 +131,7 @@ void Session::follow(const DesiredState& desired) {
   };
   give(&SceneOptions::medium, cumulet_set_medium);
   follow_ramps();
+  follow_clip();
   give(&SceneOptions::ground, cumulet_set_ground);  // before the light, because the sky is computed for the ground
   give(&SceneOptions::light, cumulet_set_sun_sky);
   give(&SceneOptions::environment_settings, cumulet_set_environment_settings);
@@ -182,6 +183,13 @@ void Session::follow_ocio() {
   }
   const cumulet_display_lut_desc desc = desc_of(lut);
   check(cumulet_set_display_lut(viewer_.get(), lut.values.empty() ? nullptr : &desc));
+}
+
+void Session::follow_clip() {
+  if (known_->clip == scene_.clip) return;
+  known_->clip = scene_.clip;
+  const cumulet_clip_desc clip = settings::clip_desc_of(scene_.clip);
+  check(cumulet_set_clip(viewer_.get(), &clip));
 }
 
 void Session::follow_analytic_lights() {

@@ -208,6 +208,7 @@ class Session {
   void follow_ramps();
   // Sets the view of OpenColorIO, or none.
   void follow_ocio();
+  void follow_clip();
   void follow_analytic_lights();
   void follow_transforms();
   void follow_surfaces();

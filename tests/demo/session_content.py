@@ -38,6 +38,44 @@ def test_volumes(s):
     assert_differ(first, second, area)
 
 
+def test_clip(s):
+    """A clip box changes no image until one of its faces is moved: in the image, or by a slider. Each drag is one undo
+    step. A plane cuts as well."""
+    volume = {"file": s.cumulus, "medium": {"density_scale": 1, "albedo": [0.8, 0.8, 0.8]}}
+    (s.out / "one.json").write_text(json.dumps({
+        "cumulet_scene": 3, "volumes": [volume], "camera": {"eye": [60, 60, 170], "target": [0, 20, 0]}}))
+    there = ["frames 2", "wait loaded", "wait converged"]
+    s.play("clip",
+           [*there, *shown("Volume 1"), *tab("Object"), *there, *shot("whole"), 'click "Clip box"', *there, *shot("on"),
+            'drag "Handle clip X max" to "Handle X"', *there, *shot("cut"), "key ctrl+z", *there, *shot("undone"),
+            'drag "Clip Y max" 0.9 0.5 to "Clip Y max" 0.6 0.5', *there, *shot("slid"),
+            'move "Handle clip X min"', "down", 'move "Handle clip X max"', "frames 2", 'report "held.json"', "key escape",
+            "frames 2", "up", "frames 2", 'report "let_go.json"',
+            'click "Clip box"', *there, 'click "Add clip plane"', *there, *shot("plane"), 'click "Remove clip plane"', *there,
+            *shot("none")],
+           "--scene", "one.json", "--spp", "4", "--max-bounces", "2", size=["--size", "1000x700"])
+    clip = lambda name: s.report(name)["volumes"][0].get("clip", {})
+    area = look(s, "whole")[2]
+    image = lambda name: look(s, name)[0]
+    on = clip("on")["box"]
+    assert clip("whole") == {} and s.report("on")["undo_steps"] == 1
+    cut = clip("cut")["box"]
+    assert cut[3] < on[3] - 0.1 * (on[3] - on[0]) and cut[:3] + cut[4:] == on[:3] + on[4:], (on, cut)
+    assert s.report("cut")["undo_steps"] == 2, "a drag is one step"
+    assert clip("undone")["box"] == on
+    assert_alike(image("on"), image("undone"), area)
+    assert_differ(image("on"), image("cut"), area)
+    slid = clip("slid")["box"]
+    assert slid[4] < on[4] and slid[:4] + slid[5:] == on[:4] + on[5:], (on, slid)
+    held = clip("held")["box"]
+    assert on[0] < held[0] < held[3] == on[3], "the faces do not pass each other"
+    assert clip("let_go")["box"] == slid, "Escape takes it back"
+    assert list(clip("plane")) == ["planes"] and len(clip("plane")["planes"]) == 1
+    assert_differ(image("plane"), image("none"), area)
+    assert clip("none") == {}
+    assert_alike(image("whole"), image("none"), area)
+
+
 def test_handles(s):
     """Objects are selected by a click or in the list. Handles move, rotate and scale them, and each drag is one undo
     step."""

@@ -116,6 +116,20 @@ void instance_settings(StageRecorder& r) {
   edit(r, "a volume again", a, [](auto& settings) { settings.volume = cloud(16, 3, "c"); });
 }
 
+// A clip changes the scene, and requests no work.
+void volumes_clipped(StageRecorder& r) {
+  const InstancePtr a = instance_of(cloud(16, 1, "a"), moved(30.0));
+  r.call("set the volume", [&] { r.viewer().set_volume(cloud(16, 2, "own")); });
+  add(r, "a", a);
+  r.wait();
+  r.frame();
+  r.call("clip the volume", [&] { r.viewer().set_clip({{1.0, 0.0, 0.0, 2.0}, {0.0, -1.0, 0.0, 3.0}}); });
+  r.frame();
+  edit(r, "clip a", a, [](auto& settings) { settings.clip = {{0.0, 0.0, 1.0, 0.5}}; });
+  r.call("no clip of the volume", [&] { r.viewer().set_clip({}); });
+  r.frame();
+}
+
 // The newest request wins, and the one that was begun is finished.
 void instance_changes_while_building(StageRecorder& r) {
   const InstancePtr a = instance_of(cloud(24, 1));
@@ -369,6 +383,7 @@ std::vector<StageScript> instance_scripts() {
           {"instances_of_several_media", instances_of_several_media},
           {"instances_hidden", instances_hidden},
           {"instance_settings", instance_settings},
+          {"volumes_clipped", volumes_clipped},
           {"instance_changes_while_building", instance_changes_while_building},
           {"instance_removed_while_building", instance_removed_while_building},
           {"instances_cancelled_while_building", instances_cancelled_while_building},

@@ -91,6 +91,13 @@ std::string text_of(const scene::InstanceTransform& transform) {
   return joined({text_of(transform.to_world), transform.ends ? text_of(*transform.ends) : ""});
 }
 
+std::string text_of(const scene::ClipPlanes& clip) {
+  std::string text;
+  for (const glm::dvec4& plane : clip)
+    text.append(text.empty() ? "clip " : ", ").append(text_of(dvec3(plane))).append(" ").append(text_of(plane.w));
+  return text;
+}
+
 std::string text_of(const scene::Viewpoint& view) {
   return joined({"eye", text_of(view.eye), "forward", text_of(view.forward), "right", text_of(view.right), "up",
                  text_of(view.up), if_set(view.orthographic, "orthographic"),
@@ -359,7 +366,7 @@ std::string StageText::volume(const scene::Volume& volume, const scene::Snapshot
   }
   return joined({"volume", object(volume.id) + ":", source(volume.source), text_of(volume.transform),
                  volume.frame ? frame(*volume.frame) : "",
-                 volume.previous ? "previously " + text_of(*volume.previous) : "",
+                 volume.previous ? "previously " + text_of(*volume.previous) : "", text_of(volume.clip),
                  has_same_medium ? "same medium" : text_of(*volume.medium)});
 }
 
