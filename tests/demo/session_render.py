@@ -81,8 +81,7 @@ def test_render(s):
 
 
 def test_walk(s):
-    """Loads a cloud, sets the sunset, adds a light and saves 1920x1080, by what the window shows alone: buttons, and the
-    keys that its menus name."""
+    """Loads a cloud, sets the sunset, adds a light and saves 1920x1080, with buttons and with keys that the menus name."""
     typed = ["frames 2", "key ctrl+a", "frames 1"]
     hand = ['click "Start/Open"', "frames 3", *typed, f'text "{s.cumulus}"', "key enter", "frames 3", "wait loaded", "frames 3", *shot("loaded"),
             'click "Scene/Sun & sky"', "frames 2", 'drag "Time of day" 0.7 0.5 to "Time of day" 0.905 0.5', "frames 3", "wait converged", "frames 30", *shot("sunset"),
