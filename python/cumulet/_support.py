@@ -241,6 +241,17 @@ def numbers(kind: Any, count: int, value: Any, name: str) -> Any:
     raise ValueError(f"{name}: {count} numbers are needed, not {len(flat)}")
 
 
+def doubles(value: Any, name: str) -> Any:
+    """A C array of numbers, or of rows of numbers. For short arrays, of which a copy is cheap."""
+    try:
+        flat: list[float] = []
+        for one in value:
+            flat.extend(one if isinstance(one, collections.abc.Iterable) else [one])
+        return (ctypes.c_double * len(flat))(*flat)
+    except TypeError:
+        raise TypeError(f"{name}: numbers or rows of numbers are needed, not {value!r}") from None
+
+
 def integer(kind: Any, value: Any, name: str) -> int:
     try:
         index = operator.index(value)
@@ -280,6 +291,8 @@ def converter(struct: Any, name: str, kind: Any) -> Callable[[Any], Any]:
             return texts
         if issubclass(target, api.Struct):
             return lambda value: structs(target, value, name)
+        if target is ctypes.c_double:
+            return lambda value: doubles(value, name)
         return lambda value: Array(value, name, SCALARS[target])
     if issubclass(target, api.Struct):
         return lambda value: ctypes.pointer(fill_from(target, value, name))

@@ -173,6 +173,9 @@ class Pictures(unittest.TestCase):
         self.viewer.set_ramp("density", [])
         self.viewer.set_color_ramp("density", [])
         self.viewer.set_clip(box=True, box_min=(0, 0, 0), box_max=(1, 2, 3), planes=[0, 1, 0, -0.5])
+        self.viewer.set_clip(planes=[(0, 1, 0, -0.5), (1, 0, 0, 2)])
+        with self.assertRaises(TypeError):
+            self.viewer.set_clip(planes=[("x", 1, 0, -0.5)])
         with self.assertRaises(cumulet.Error):
             self.viewer.set_clip(planes=[0, 0, 0, 1])
         with self.assertRaises(ValueError):

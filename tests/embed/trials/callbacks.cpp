@@ -70,6 +70,7 @@ void Caller::call_others() {
   const auto file = make_desc<cumulet_volume_file_desc>();
   cumulet_volume* new_volume = nullptr;
   cumulet_environment* new_environment = nullptr;
+  CALL(cumulet_instance_set_clip, nullptr, nullptr);
   CALL(cumulet_instance_set_color_ramp, nullptr, CUMULET_RAMP_DENSITY, nullptr, 0);
   CALL(cumulet_volume_open, "none.vdb", nullptr, &new_volume, nullptr, 0);
   CALL(cumulet_volume_open_file, &file, &new_volume, nullptr, 0);
@@ -84,6 +85,7 @@ void Caller::call_others() {
   cumulet_interpolation interpolation{};
   for (cumulet_viewer* v : {viewer, other}) {
     CALL(cumulet_get_interpolation, v, &interpolation);
+    CALL(cumulet_set_clip, v, nullptr);
     CALL(cumulet_set_color_ramp, v, CUMULET_RAMP_DENSITY, nullptr, 0);
     CALL(cumulet_set_display_lut, v, nullptr);
     CALL(cumulet_begin_read, v, &read, &number);
