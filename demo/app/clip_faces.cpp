@@ -18,7 +18,10 @@ namespace {
 constexpr double max_frontal_cosine = 0.98;  // cosine between the axis and the view
 constexpr double min_extent = 1e-3;          // of a dragged box, relative to its extent before
 
-dvec3 axis_of(const ClipFace& face, const dmat4& transform) { return dvec3(transform[face.axis]); }
+dvec3 axis_of(const ClipFace& face, const dmat4& transform) {
+  const dvec4& axis = transform[face.axis];
+  return {axis.x, axis.y, axis.z};
+}
 
 }  // namespace
 
@@ -31,7 +34,8 @@ dvec3 center_of(const ClipFace& face, const ClipBox& box, const dmat4& transform
   const dvec3 high(box[3], box[4], box[5]);
   dvec3 at = 0.5 * (low + high);
   at[face.axis] = face.high ? high[face.axis] : low[face.axis];
-  return dvec3(transform * dvec4(at, 1.0));
+  const dvec4 center = transform * dvec4(at, 1.0);
+  return {center.x, center.y, center.z};
 }
 
 bool can_be_dragged(const ClipFace& face, const ClipBox& box, const dmat4& transform, const Sight& sight) {
@@ -64,7 +68,7 @@ ClipDrag::ClipDrag(const ClipFace& face, const ClipBox& box, const dmat4& transf
 ClipBox ClipDrag::to(const Sight& sight, const dvec2& pixel, bool snapped) {
   const auto now = along(sight, pixel);
   if (!now || !grasp_) return box_;
-  const std::size_t axis = static_cast<std::size_t>(face_.axis);
+  const auto axis = static_cast<std::size_t>(face_.axis);
   const double extent = begun_[axis + 3] - begun_[axis];
   double at = begun_[number()] + *now - *grasp_;
   if (snapped) {

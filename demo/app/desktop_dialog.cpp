@@ -51,6 +51,7 @@ bool DesktopDialog::open(const Request& request) {
       program_, request.saves ? "save" : "open", request.title, request.parent, request.folder, request.name};
   texts.insert(texts.end(), request.extensions.begin(), request.extensions.end());
   std::vector<char*> arguments;
+  arguments.reserve(texts.size() + 1);
   for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions{};

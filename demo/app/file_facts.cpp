@@ -27,7 +27,7 @@ std::string written_text(const std::string& path) {
 std::string size_text(std::uint64_t bytes) {
   constexpr std::array units = {"kB", "MB", "GB", "TB", "PB", "EB"};
   if (bytes < 1000) return std::to_string(bytes) + " B";
-  auto unit = units.begin();
+  const auto* unit = units.begin();
   double number = static_cast<double>(bytes) / 1000.0;
   for (; number >= 999.95 && std::next(unit) != units.end(); ++unit) number /= 1000.0;
   std::array<char, 32> text{};

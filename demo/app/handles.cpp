@@ -157,6 +157,28 @@ std::optional<std::pair<settings::ClipBox, dmat4>> clip_of(const Model& model) {
   return box ? std::optional(std::pair(*box, *transform)) : std::nullopt;
 }
 
+// Draws the mark of each light, and the outline of the selected object.
+void draw_objects(const Pen& pen, ImDrawList& list, const Model& model) {
+  const float scale = pen.scale();
+  for (const Item& item : items_of(model.scene)) {
+    const bool is_chosen = item == model.chosen;
+    const dmat4 transform = *transform_of(model.scene, item);
+    if (item.kind == Item::Kind::analytic_light) {
+      const auto at = pen.sight().project(pivot_of(transform, std::nullopt));
+      const float radius = static_cast<float>(mark_radius) * scale;
+      if (at) {
+        const ImU32 color = is_chosen ? chosen_color : analytic_light_color;
+        list.AddCircle(vec(*at), radius, shade, 0, (thin + 2.0f) * scale);
+        list.AddCircle(vec(*at), radius, color, 0, thin * scale);
+        list.AddCircleFilled(vec(*at), 0.3f * radius, color);
+      }
+      if (is_chosen) draw_analytic_light(pen, model.scene.analytic_lights[item.index], transform);
+    } else if (is_chosen) {
+      if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, transform, *box);
+    }
+  }
+}
+
 // Draws the outline of a clip box, and the handle of each face.
 void draw_clip(const Pen& pen, ImDrawList& list, const settings::ClipBox& box, const dmat4& transform,
                const std::optional<ClipFace>& hot) {
@@ -287,38 +309,29 @@ std::optional<Rectangle> Handles::find(const std::string& label, const Model& mo
   return std::nullopt;
 }
 
+std::optional<ClipFace> Handles::draw_clip_of(ImDrawList& list, const Model& model, const Sight& sight,
+                                              const std::optional<dvec2>& pixel, float scale) const {
+  const auto clip = clip_of(model);
+  if (!clip) return std::nullopt;
+  const auto& [box, transform] = *clip;
+  const Pen pen(list, sight, scale);
+  std::optional<ClipFace> hot;
+  if (held_face_)
+    hot = held_face_->drag.face();
+  else if (pixel && !held_)
+    hot = clip_face_at(box, transform, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
+  draw_clip(pen, list, box, transform, hot);
+  const auto at = held_face_ ? sight.project(center_of(*hot, box, transform)) : std::nullopt;
+  if (at) pen.text(*at + 12.0 * static_cast<double>(scale), held_face_->drag.label());
+  return hot;
+}
+
 void Handles::draw(ImDrawList& list, const Model& model, const Sight& sight, const std::optional<dvec2>& pixel,
                    float scale) const {
   if (model.tool == Tool::none) return;
   const Pen pen(list, sight, scale);
-  for (const Item& item : items_of(model.scene)) {
-    const bool is_chosen = item == model.chosen;
-    const dmat4 transform = *transform_of(model.scene, item);
-    if (item.kind == Item::Kind::analytic_light) {
-      const auto at = sight.project(pivot_of(transform, std::nullopt));
-      const double radius = mark_radius * static_cast<double>(scale);
-      if (at) {
-        const ImU32 color = is_chosen ? chosen_color : analytic_light_color;
-        list.AddCircle(vec(*at), static_cast<float>(radius), shade, 0, (thin + 2.0f) * scale);
-        list.AddCircle(vec(*at), static_cast<float>(radius), color, 0, thin * scale);
-        list.AddCircleFilled(vec(*at), static_cast<float>(0.3 * radius), color);
-      }
-      if (is_chosen) draw_analytic_light(pen, model.scene.analytic_lights[item.index], transform);
-    } else if (is_chosen) {
-      if (const auto box = box_of(model.scene, model.status.boxes, item)) draw_box(pen, transform, *box);
-    }
-  }
-  std::optional<ClipFace> hot_face;
-  if (const auto clip = clip_of(model)) {
-    const auto& [box, transform] = *clip;
-    if (held_face_)
-      hot_face = held_face_->drag.face();
-    else if (pixel && !held_)
-      hot_face = clip_face_at(box, transform, sight, *pixel, grasp_tolerance * static_cast<double>(scale));
-    draw_clip(pen, list, box, transform, hot_face);
-    const auto at = held_face_ ? sight.project(center_of(*hot_face, box, transform)) : std::nullopt;
-    if (at) pen.text(*at + 12.0 * static_cast<double>(scale), held_face_->drag.label());
-  }
+  draw_objects(pen, list, model);
+  const std::optional<ClipFace> hot_face = draw_clip_of(list, model, sight, pixel, scale);
   const auto gizmo = gizmo_of(model, scale);
   if (!gizmo) return;
   std::optional<Handle> hot;

@@ -59,6 +59,9 @@ class Handles {
     glm::dvec2 pixel;  // last pointer position
     bool snapped = false;
   };
+  // Draws the clip box of the selected volume. Returns the face that is dragged or under the pointer.
+  std::optional<ClipFace> draw_clip_of(ImDrawList& list, const Model& model, const Sight& sight,
+                                       const std::optional<glm::dvec2>& pixel, float scale) const;
   void drag_face(Model& model, const Sight& sight, const glm::dvec2& pixel, bool snapped);
 
   std::optional<Held> held_;

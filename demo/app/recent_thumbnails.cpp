@@ -96,6 +96,7 @@ void RecentThumbnails::begin(const std::string& file, const std::string& picture
   if (has_ending(file, ".json")) texts.emplace_back("--scene");
   texts.push_back(file);
   std::vector<char*> arguments;
+  arguments.reserve(texts.size() + 1);
   for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions{};

@@ -546,7 +546,7 @@ class SelfTest {
 
   /// Gives both viewers the same size.
   void even_out() {
-    const auto time = [clock = QElapsedTimer(), this]() mutable {
+    const auto time = [clock = QElapsedTimer()]() mutable {
       if (!clock.isValid()) clock.start();
       return clock.hasExpired(200);
     };

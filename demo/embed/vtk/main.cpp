@@ -59,9 +59,9 @@ void must(const cumulet::Result<>& result) {
 /// VTK's matrices are row-major.
 cumulet::Matrix column_major(vtkMatrix4x4& matrix) {
   cumulet::Matrix columns{};
+  auto* element = columns.data();
   for (int column = 0; column < 4; ++column)
-    for (int row = 0; row < 4; ++row)
-      columns[static_cast<std::size_t>(4 * column + row)] = matrix.GetElement(row, column);
+    for (int row = 0; row < 4; ++row) *element++ = matrix.GetElement(row, column);
   return columns;
 }
 
@@ -121,7 +121,7 @@ class VolumeLayer final : public vtkCommand {
          .projection = column_major(*camera->GetProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0))},
         cumulet::ClipSpace::negative_one_to_one));
     std::array<int, 4> viewport{};
-    renderer.GetTiledSizeAndOrigin(&viewport[2], &viewport[3], &viewport[0], &viewport[1]);
+    renderer.GetTiledSizeAndOrigin(&viewport[2], &viewport[3], viewport.data(), &viewport[1]);
     // VTK draws into this framebuffer, often a multisampled one, and copies it to the screen later.
     const int* size = window.GetRenderFramebuffer()->GetLastSize();
     const unsigned int framebuffer = window.GetRenderFramebuffer()->GetFBOIndex();
