@@ -28,7 +28,7 @@ struct OcioDisplays {
 
 /// Reads displays and color spaces. Throws std::runtime_error, one line with the configuration and the cause, also if
 /// there is no display.
-[[nodiscard]] OcioDisplays ocio_displays(const std::string& config);
+[[nodiscard]] OcioDisplays ocio_displays(const std::string& file);
 
 /// Bakes the view. Radiance enters as the given color space. Without one the function takes a space with a usual name
 /// of linear Rec. 709, else the role aces_interchange, else a space with the name "linear". note: receives a line about

@@ -14,9 +14,10 @@ namespace {
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-convert-member-functions-to-static): as declared for builds with OpenColorIO
 const OcioDisplay* OcioDisplays::find(const std::string& /*name*/) const { return nullptr; }
 
-OcioDisplays ocio_displays(const std::string& config) { refuse(config); }
+OcioDisplays ocio_displays(const std::string& file) { refuse(file); }
 
 DisplayLut bake_ocio_view(const OcioView& view, std::string* /*note*/) { refuse(view.config); }
 
