@@ -17,7 +17,7 @@ namespace cumulet::demo {
 /// file does not exist.
 [[nodiscard]] std::string find_network(const std::string& folder);
 
-/// What denoises an image. Without both it is the filter of the Cumulet library.
+/// The denoiser of an image. Without both members it is the filter of the Cumulet library.
 struct Denoiser {
   std::string network = {};                 ///< path; "": none
   std::optional<std::string> library = {};  ///< as cumulet_denoise_desc::oidn_library

@@ -15,7 +15,7 @@ namespace cumulet::demo {
 namespace {
 
 void set_display(const Viewer& viewer, cumulet_display_desc display) {
-  display.denoise = CUMULET_DENOISE_OFF;  // as in the rest of the program, which denoises what it has read
+  display.denoise = CUMULET_DENOISE_OFF;  // the program denoises pixels after it has read them
   check(viewer, cumulet_set_display(viewer.get(), &display));
 }
 

@@ -58,7 +58,7 @@ struct Shot {
   [[nodiscard]] const std::optional<scene::Viewpoint>& view() const { return *scene->view; }
 };
 
-/// What denoises an image that is read back: a library, else a network, else the real-time filter.
+/// The denoiser of an image that is read back: a library, else a network, else the real-time filter.
 struct Denoisers {
   denoise::NetworkPtr network;
   denoise::OidnLibraryPtr library;

@@ -371,7 +371,7 @@ typedef struct cumulet_shader_cache_desc {
  *
  * - The programs are deleted with the last viewer that is attached to them; the files in the folder stay.
  * - Viewers share cells in GL memory if they show the same grids (@ref cumulet_volumes) in the same order. One viewer
- *   uploads them, within its frames. Meanwhile the others show what they have. If that viewer renders no more frames,
+ *   uploads them, within its frames. Meanwhile the others show their last image. If that viewer renders no more frames,
  *   another one uploads them. The copy is deleted with the last viewer that shows it, whichever viewer uploaded it.
  *   cumulet_detach, cumulet_context_lost and cumulet_destroy of one viewer do not affect the others.
  * - A shared copy counts in full for each viewer, in cumulet_limits_desc.gl_bytes and in cumulet_stats. So the grids

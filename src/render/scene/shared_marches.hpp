@@ -44,7 +44,7 @@ class SharedMarches {
   /// Frees data that no viewer holds. Later commands of the current context, which may write to the memory, run after
   /// the commands of other contexts that used it.
   void collect();
-  /// Takes what a viewer leaves that loses its context: its heap, and an unfinished upload. They are freed by the next
+  /// Takes the heap and an unfinished upload of a viewer that loses its context. They are freed by the next
   /// collect(). Needs no context.
   void leave(gl::WordHeap heap, std::optional<MarchData> unfinished);
 
