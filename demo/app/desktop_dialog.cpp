@@ -1,21 +1,17 @@
 #include "desktop_dialog.hpp"
 
 #include <fcntl.h>
-#include <signal.h>  // NOLINT(modernize-deprecated-headers): kill() is POSIX
-#include <spawn.h>
+#include <signal.h>  // NOLINT(modernize-deprecated-headers): signals of POSIX
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
-#include <filesystem>
 #include <system_error>
 #include <utility>
 
 namespace cumulet::demo {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Reads a pipe whose writer has ended. Returns the text without its last line break, and closes the pipe.
 std::string take_text(int pipe) {
@@ -29,63 +25,53 @@ std::string take_text(int pipe) {
   return text;
 }
 
-int wait_for(pid_t process) {
-  int status = 0;
-  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
+/// A pipe whose ends are closed with it, unless they were taken.
+struct Pipe {
+  Pipe() { made = ::pipe2(ends.data(), O_CLOEXEC) == 0; }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  ~Pipe() {
+    if (!made) return;
+    ::close(ends[1]);
+    if (!taken) ::close(ends[0]);
   }
-  return status;
-}
+  std::array<int, 2> ends{};
+  bool made = false;
+  bool taken = false;  // the read end
+};
 
 }  // namespace
 
 bool DesktopDialog::open(const Request& request) {
-  std::array<int, 2> output{};
-  std::array<int, 2> errors{};
-  if (::pipe2(output.data(), O_CLOEXEC) != 0) return false;
-  if (::pipe2(errors.data(), O_CLOEXEC) != 0) {
-    ::close(output[0]);
-    ::close(output[1]);
-    return false;
-  }
-  std::vector<std::string> texts = {
+  Pipe output;
+  Pipe errors;
+  if (!output.made || !errors.made) return false;
+  std::vector<std::string> arguments = {
       program_, request.saves ? "save" : "open", request.title, request.parent, request.folder, request.name};
-  texts.insert(texts.end(), request.extensions.begin(), request.extensions.end());
-  std::vector<char*> arguments;
-  arguments.reserve(texts.size() + 1);
-  for (std::string& text : texts) arguments.push_back(text.data());
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions{};
-  ::posix_spawn_file_actions_init(&actions);
-  ::posix_spawn_file_actions_adddup2(&actions, output[1], STDOUT_FILENO);
-  ::posix_spawn_file_actions_adddup2(&actions, errors[1], STDERR_FILENO);
-  pid_t process = 0;
-  const int failure = ::posix_spawn(&process, program_.c_str(), &actions, nullptr, arguments.data(), environ);
-  ::posix_spawn_file_actions_destroy(&actions);
-  ::close(output[1]);
-  ::close(errors[1]);
-  if (failure != 0) {
-    ::close(output[0]);
-    ::close(errors[0]);
+  arguments.insert(arguments.end(), request.extensions.begin(), request.extensions.end());
+  try {
+    open_ = Open{
+        std::make_unique<ChildProcess>(std::move(arguments), ChildProcess::Streams{output.ends[1], errors.ends[1]}),
+        output.ends[0], errors.ends[0]};
+  } catch (const std::system_error&) {
     return false;
   }
-  process_ = Process{process, output[0], errors[0]};
+  output.taken = errors.taken = true;
   return true;
 }
 
 std::optional<DesktopDialog::Result> DesktopDialog::take() {
-  if (!process_) return std::nullopt;
-  int status = 0;
-  const pid_t ended = ::waitpid(process_->id, &status, WNOHANG);
-  if (ended == 0 || (ended < 0 && errno == EINTR)) return std::nullopt;
-  return end(status);
+  if (!open_) return std::nullopt;
+  const auto status = open_->process->status();
+  return status ? std::optional(end(*status)) : std::nullopt;
 }
 
 DesktopDialog::Result DesktopDialog::end(int status) {
   constexpr int closed = 1;  // exit status of cumulet-file-dialog
-  const Process process = *std::exchange(process_, std::nullopt);
   Result result;
-  result.path = take_text(process.output);
-  result.cause = take_text(process.errors);
+  result.path = take_text(open_->output);
+  result.cause = take_text(open_->errors);
+  open_.reset();
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && !result.path.empty())
     result.outcome = Result::Outcome::chosen;
   else if (WIFEXITED(status) && WEXITSTATUS(status) == closed)
@@ -96,20 +82,14 @@ DesktopDialog::Result DesktopDialog::end(int status) {
 }
 
 void DesktopDialog::close() {
-  if (!process_) return;
+  if (!open_) return;
   // The portal closes the dialog when its caller leaves the bus.
-  ::kill(process_->id, SIGTERM);
-  static_cast<void>(end(wait_for(process_->id)));
+  open_->process->end(SIGTERM);
+  static_cast<void>(end(*open_->process->status()));
 }
 
 std::string desktop_dialog_program() {
-  std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (error) return "";
-  constexpr const char* name = "cumulet-file-dialog";
-  for (const fs::path& folder : {self.parent_path(), self.parent_path() / ".." / CUMULET_LIBEXEC_DIR / "cumulet"})
-    if (fs::is_regular_file(folder / name, error)) return (folder / name).lexically_normal().string();
-  return "";
+  return find_program("cumulet-file-dialog", "../" CUMULET_LIBEXEC_DIR "/cumulet");
 }
 
 }  // namespace cumulet::demo

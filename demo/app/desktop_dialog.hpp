@@ -1,10 +1,12 @@
 #pragma once
 
-#include <sys/types.h>
-
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "child_process.hpp"
 
 namespace cumulet::demo {
 
@@ -36,21 +38,21 @@ class DesktopDialog {
 
   /// Returns false if the program cannot be started. The dialog must not be open.
   [[nodiscard]] bool open(const Request& request);
-  [[nodiscard]] bool is_open() const { return process_.has_value(); }
+  [[nodiscard]] bool is_open() const { return open_.has_value(); }
   /// Returns the result once. Call it repeatedly while the dialog is open.
   [[nodiscard]] std::optional<Result> take();
   void close();
 
  private:
-  struct Process {
-    pid_t id;
+  struct Open {
+    std::unique_ptr<ChildProcess> process;
     int output;  // read end of a pipe
     int errors;
   };
   [[nodiscard]] Result end(int status);
 
   std::string program_;
-  std::optional<Process> process_;  // nullopt: the dialog is closed
+  std::optional<Open> open_;  // nullopt: the dialog is closed
 };
 
 /// Returns the path of cumulet-file-dialog, which is beside this program or in its installation; "" if it is absent.

@@ -1,15 +1,11 @@
 #include "recent_thumbnails.hpp"
 
-#include <fcntl.h>
-#include <signal.h>  // NOLINT(modernize-deprecated-headers): kill() is POSIX
-#include <spawn.h>
-#include <sys/resource.h>
+#include <signal.h>  // NOLINT(modernize-deprecated-headers): signals of POSIX
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
-#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <program.hpp>
@@ -35,9 +31,7 @@ RecentThumbnails::~RecentThumbnails() { stop(); }
 
 void RecentThumbnails::stop() {
   if (!making_) return;
-  ::kill(making_->process, SIGKILL);
-  while (::waitpid(making_->process, nullptr, 0) < 0 && errno == EINTR) {
-  }
+  making_->process->end(SIGKILL);  // SIGTERM would first write the picture
   std::error_code error;
   fs::remove(making_->unfinished, error);
   making_.reset();
@@ -60,15 +54,13 @@ std::string RecentThumbnails::find(const std::string& file) const {
   return !picture.empty() && fs::is_regular_file(picture, error) ? picture : "";
 }
 
-bool RecentThumbnails::follow(std::span<const std::string> files) {
-  if (program_.empty() || folder_.empty()) return false;
-  bool made = false;
+void RecentThumbnails::follow(std::span<const std::string> files) {
+  if (program_.empty() || folder_.empty()) return;
   if (making_) {
-    int status = 0;
-    const pid_t ended = ::waitpid(making_->process, &status, WNOHANG);
-    if (ended == 0 || (ended < 0 && errno == EINTR)) return false;
+    const auto status = making_->process->status();
+    if (!status) return;
     std::error_code error;
-    made = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    const bool made = WIFEXITED(*status) && WEXITSTATUS(*status) == 0;
     if (made) fs::rename(making_->unfinished, making_->picture, error);
     if (!made || error) {
       failed_[making_->file] = making_->picture;
@@ -85,42 +77,25 @@ bool RecentThumbnails::follow(std::span<const std::string> files) {
     begin(file, picture);
     break;
   }
-  return made;
 }
 
 void RecentThumbnails::begin(const std::string& file, const std::string& picture) {
   std::error_code error;
   fs::create_directories(folder_, error);
   const std::string unfinished = picture + '.' + std::to_string(::getpid()) + ".part";
-  std::vector<std::string> texts = {program_, "--thumbnail", std::to_string(side), "-o", unfinished};
-  if (has_ending(file, ".json")) texts.emplace_back("--scene");
-  texts.push_back(file);
-  std::vector<char*> arguments;
-  arguments.reserve(texts.size() + 1);
-  for (std::string& text : texts) arguments.push_back(text.data());
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions{};
-  ::posix_spawn_file_actions_init(&actions);
-  for (const int output : {STDOUT_FILENO, STDERR_FILENO})
-    ::posix_spawn_file_actions_addopen(&actions, output, "/dev/null", O_WRONLY, 0);
-  pid_t process = 0;
-  const int failure = ::posix_spawn(&process, program_.c_str(), &actions, nullptr, arguments.data(), environ);
-  ::posix_spawn_file_actions_destroy(&actions);
-  if (failure != 0) {
+  std::vector<std::string> arguments = {program_, "--thumbnail", std::to_string(side), "-o", unfinished};
+  if (has_ending(file, ".json")) arguments.emplace_back("--scene");
+  arguments.push_back(file);
+  try {
+    auto process = std::make_unique<ChildProcess>(std::move(arguments), ChildProcess::Streams{});
+    process->yield(low_priority);
+    making_ = Making{std::move(process), file, picture, unfinished};
+  } catch (const std::system_error&) {
     failed_[file] = picture;
-    return;
   }
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(process), low_priority);
-  making_ = Making{process, file, picture, unfinished};
 }
 
-std::string thumbnail_program() {
-  std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (error) return "";
-  const fs::path program = self.parent_path() / "cumulet-render";
-  return fs::is_regular_file(program, error) ? program.string() : "";
-}
+std::string thumbnail_program() { return find_program("cumulet-render"); }
 
 std::string thumbnail_folder() {
   const std::string cache = user_folder("XDG_CACHE_HOME", ".cache");

@@ -1,11 +1,12 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
+
+#include "child_process.hpp"
 
 namespace cumulet::demo {
 
@@ -22,8 +23,8 @@ class RecentThumbnails {
   /// Ends the program if it runs.
   ~RecentThumbnails();
 
-  /// Begins the next missing thumbnail of these files. Call it repeatedly. Returns true if there may be a new one.
-  bool follow(std::span<const std::string> files);
+  /// Begins the next missing thumbnail of these files. Call it repeatedly.
+  void follow(std::span<const std::string> files);
   /// Ends the current thumbnail's rendering, for example because the user has opened a file. It is begun again later.
   void stop();
   [[nodiscard]] bool works() const { return making_.has_value(); }
@@ -32,7 +33,7 @@ class RecentThumbnails {
 
  private:
   struct Making {
-    pid_t process;
+    std::unique_ptr<ChildProcess> process;
     std::string file;
     std::string picture;     // complete when it has this name
     std::string unfinished;  // name until then

@@ -1,19 +1,15 @@
 #include "samples.hpp"
 
-#include <fcntl.h>
-#include <signal.h>  // NOLINT(modernize-deprecated-headers): kill() is POSIX
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <program.hpp>
 #include <scene_file.hpp>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "sample_pictures.hpp"
 
@@ -44,12 +40,6 @@ const std::array<Sample, 2>& samples() {
 SampleFiles::SampleFiles(std::string program, std::string folder)
     : program_(std::move(program)), folder_(std::move(folder)) {}
 
-SampleFiles::~SampleFiles() {
-  if (process_ == 0) return;
-  ::kill(process_, SIGTERM);
-  while (!has_ended()) ::usleep(1000);
-}
-
 bool SampleFiles::are_complete() const {
   return std::ranges::all_of(files, [&](const char* file) {
     std::error_code error;
@@ -61,24 +51,18 @@ void SampleFiles::request(const std::string& scene) {
   if (!exist()) throw std::runtime_error("the sample scenes need cumulet-scene beside this program");
   wanted_ = scene;
   if (writes() || are_complete()) return;
-  std::string option = "--frame";
-  std::string number = frame;
-  std::array<char*, 5> arguments = {program_.data(), folder_.data(), option.data(), number.data(), nullptr};
-  posix_spawn_file_actions_t actions{};
-  ::posix_spawn_file_actions_init(&actions);
-  ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  const int failure = ::posix_spawn(&process_, program_.c_str(), &actions, nullptr, arguments.data(), environ);
-  ::posix_spawn_file_actions_destroy(&actions);
-  if (failure == 0) return;
-  process_ = 0;
-  wanted_.clear();
-  throw std::runtime_error(program_ + ": " + std::generic_category().message(failure));
+  try {
+    process_.emplace(std::vector<std::string>{program_, folder_, "--frame", frame},
+                     ChildProcess::Streams{.output = {}, .errors = STDERR_FILENO});
+  } catch (const std::system_error& error) {
+    wanted_.clear();
+    throw std::runtime_error(program_ + ": " + error.code().message());
+  }
 }
 
 bool SampleFiles::has_ended() {
-  const pid_t ended = ::waitpid(process_, &status_, WNOHANG);
-  if (ended == 0 || (ended < 0 && errno == EINTR)) return false;
-  process_ = 0;
+  if (!process_->status()) return false;
+  process_.reset();
   return true;
 }
 
@@ -89,13 +73,7 @@ std::optional<std::string> SampleFiles::take() {
   return (fs::path(folder_) / scene).string();
 }
 
-std::string sample_program() {
-  std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (error) return "";
-  const fs::path program = self.parent_path() / "cumulet-scene";
-  return fs::is_regular_file(program, error) ? program.string() : "";
-}
+std::string sample_program() { return find_program("cumulet-scene"); }
 
 std::string sample_folder() {
   const std::string cache = user_folder("XDG_CACHE_HOME", ".cache");

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <array>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "child_process.hpp"
 
 namespace cumulet::demo {
 
@@ -25,11 +25,9 @@ class SampleFiles {
   SampleFiles(std::string program, std::string folder);
   SampleFiles(const SampleFiles&) = delete;
   SampleFiles& operator=(const SampleFiles&) = delete;
-  /// Ends the program if it runs.
-  ~SampleFiles();
 
   [[nodiscard]] bool exist() const { return !program_.empty() && !folder_.empty(); }
-  [[nodiscard]] bool writes() const { return process_ != 0; }
+  [[nodiscard]] bool writes() const { return process_.has_value(); }
   /// Requests a scene. Throws std::runtime_error, one line, if the program cannot be started.
   void request(const std::string& scene);
   /// Returns the path of the requested scene once, when its files are complete. Call it repeatedly. Throws
@@ -43,9 +41,8 @@ class SampleFiles {
 
   std::string program_;
   std::string folder_;
-  std::string wanted_;  // name of the requested scene; "": none
-  pid_t process_ = 0;   // 0: does not run
-  int status_ = 0;      // of the process that has ended
+  std::string wanted_;                   // name of the requested scene; "": none
+  std::optional<ChildProcess> process_;  // nullopt: does not run
 };
 
 /// Returns the path of cumulet-scene, in the folder of this program; "" if it is not there.
