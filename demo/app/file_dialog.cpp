@@ -48,6 +48,7 @@ void FileDialog::enter(const std::string& folder) {
     return;
   }
   folder_ = there.string();
+  sorted_ = false;
   trouble_.clear();
 }
 
@@ -100,16 +101,16 @@ void FileDialog::take_desktop_result(const DesktopDialog::Result& result, std::v
   choose(commands);
 }
 
-void FileDialog::draw_places(Ui& ui, const Preferences& preferences) {
-  const std::vector<Place> all = places(preferences.recent);
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (Ui::entry(end_of(all[i].label, ImGui::GetContentRegionAvail().x), i, all[i].folder == folder_,
+void FileDialog::draw_places(Ui& ui) {
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const Place& place = places_[i];
+    if (Ui::entry(end_of(place.label, ImGui::GetContentRegionAvail().x), i, place.folder == folder_,
                   ImGuiSelectableFlags_DontClosePopups)) {
       const std::string name = fs::path(path_).filename().string();
-      enter(all[i].folder);
+      enter(place.folder);
       path_ = saving() ? (fs::path(folder_) / name).string() : "";
     }
-    ui.remember(("Places/" + all[i].label).c_str(), all[i].folder.c_str());
+    ui.remember(("Places/" + place.label).c_str(), place.folder.c_str());
   }
 }
 
@@ -121,9 +122,13 @@ void FileDialog::list(Ui& ui, std::vector<Command>& commands) {
   ImGui::TableSetupColumn("Size", ImGuiTableColumnFlags_WidthFixed, ui.px(70.0f));
   ImGui::TableSetupColumn("Date", ImGuiTableColumnFlags_WidthFixed, ui.px(120.0f));
   ImGui::TableHeadersRow();
-  if (const ImGuiTableSortSpecs* sort = ImGui::TableGetSortSpecs(); sort != nullptr && sort->SpecsCount > 0)
+  ImGuiTableSortSpecs* const sort = ImGui::TableGetSortSpecs();
+  if (sort != nullptr && sort->SpecsCount > 0 && (sort->SpecsDirty || !sorted_)) {
     sort_entries(entries_, static_cast<FolderOrder>(sort->Specs->ColumnIndex),
                  sort->Specs->SortDirection == ImGuiSortDirection_Descending);
+    sort->SpecsDirty = false;
+    sorted_ = true;
+  }
   std::string entered;
   if (const fs::path up = fs::path(folder_).parent_path(); up != folder_) {
     ImGui::TableNextColumn();
@@ -233,7 +238,10 @@ void FileDialog::draw_waiting(Ui& ui, std::vector<Command>& commands) {
 }
 
 void FileDialog::draw_own(Ui& ui, const Preferences& preferences, std::vector<Command>& commands) {
-  if (opening_) ImGui::SetKeyboardFocusHere();
+  if (opening_) {
+    ImGui::SetKeyboardFocusHere();
+    places_ = places(preferences.recent);
+  }
   opening_ = false;
   const std::string endings = endings_text();
   if (ui.text("Path", ("Full path of the file: " + endings + ". Press Enter to accept.").c_str(),
@@ -244,7 +252,7 @@ void FileDialog::draw_own(Ui& ui, const Preferences& preferences, std::vector<Co
   Ui::heading(end_of(folder_, ImGui::GetContentRegionAvail().x).c_str());
   static_cast<void>(ui.text("Search", "Lists only names that contain these words.", "Part of a name", search_));
   ImGui::BeginChild("places", {ui.px(130.0f), ui.px(240.0f)}, true, ImGuiWindowFlags_NavFlattened);
-  draw_places(ui, preferences);
+  draw_places(ui);
   ImGui::EndChild();
   ImGui::SameLine();
   list(ui, commands);

@@ -40,7 +40,7 @@ class FileDialog {
   void take_desktop_result(const DesktopDialog::Result& result, std::vector<Command>& commands);
   void draw_waiting(Ui& ui, std::vector<Command>& commands);
   void draw_own(Ui& ui, const Preferences& preferences, std::vector<Command>& commands);
-  void draw_places(Ui& ui, const Preferences& preferences);
+  void draw_places(Ui& ui);
   void list(Ui& ui, std::vector<Command>& commands);
   void recent(Ui& ui, const Preferences& preferences, std::vector<Command>& commands);
   void draw_trouble(const std::string& endings) const;
@@ -58,6 +58,8 @@ class FileDialog {
   std::string search_;
   std::string trouble_;
   std::vector<FolderEntry> entries_;
+  bool sorted_ = false;        // entries_ have the order of the table's header
+  std::vector<Place> places_;  // when the dialog was opened
 };
 
 }  // namespace cumulet::demo

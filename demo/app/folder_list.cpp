@@ -48,7 +48,7 @@ std::vector<FolderEntry> list_folder(const std::string& folder, std::span<const 
     if (!listed) continue;
     if (known) {
       entry.written = status.st_mtime;
-      entry.date = written_text(iterator->path().string());
+      entry.date = time_text(entry.written);
     }
     if (known && !entry.folder) {
       entry.bytes = static_cast<std::uint64_t>(status.st_size);
