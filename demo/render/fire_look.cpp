@@ -59,12 +59,13 @@ void FireLook::settle(SceneOptions& scene) {
 void FireLook::expose(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised) {
   // All regions of an image have the same exposure.
   if (!dusk_ || !has_one_image_ || options.format != OutputFormat::png || !is_whole(options.scene)) return;
-  std::vector<float> rgba(denoised);
-  if (rgba.empty()) {
-    rgba.resize(std::size_t{4} * options.scene.width * options.scene.height);
-    check(viewer, cumulet_read_linear(viewer.get(), rgba.data(), rgba.size()));
+  std::vector<float> read;
+  if (denoised.empty()) {
+    read.resize(std::size_t{4} * options.scene.width * options.scene.height);
+    check(viewer, cumulet_read_linear(viewer.get(), read.data(), read.size()));
   }
-  const auto stops = image::suitable_exposure(rgba, options.scene.width, options.scene.height);
+  const auto stops =
+      image::suitable_exposure(denoised.empty() ? read : denoised, options.scene.width, options.scene.height);
   const bool is_close = !stops || std::abs(*stops - dusk_exposure) < exposure_tolerance;
   dusk_->display.exposure_stops = is_close ? dusk_exposure : *stops;
   set_display(viewer, dusk_->display);
