@@ -54,7 +54,7 @@ App::App(DemoOptions options)
   model_.preferences = load_preferences(preferences_path_);
   model_.navigation.style = model_.preferences.style;
   derived_.exposure_given = options_.exposure_given;
-  meter_after_load();
+  meter_when_loaded();
   if (!options_.replay.empty())
     replay_.player.emplace(parse_replay(image::read_file(options_.replay), options_.replay), options_.replay);
   if (!options_.trace.empty()) image::check_writable(options_.trace);

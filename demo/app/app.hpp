@@ -113,7 +113,7 @@ class App {
   /// Returns true if the medium was set neither by the user nor by a flag or scene file.
   [[nodiscard]] bool is_unsaid() const;
   /// Measures the exposure when everything is loaded, unless the user has disabled that.
-  void meter_after_load() { loading_.meter = model_.preferences.auto_exposure; }
+  void meter_when_loaded() { loading_.meter = model_.preferences.auto_exposure; }
   /// Sets the measured exposure, or keeps one that the user or a scene file has set.
   void take_exposure(const Metered& metered);
   void complain(const std::string& cause);

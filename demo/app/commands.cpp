@@ -267,10 +267,10 @@ struct App::Commands {
        [](App& app, const Command& command) {
          if (!app.ask_about_changes({command})) app.quit_ = true;
        }},
-      {Action::follow_light, [](App& app, const Command&) { app.meter_after_load(); }},
+      {Action::follow_light, [](App& app, const Command&) { app.meter_when_loaded(); }},
       {Action::daylight,
        [](App& app, const Command&) {
-         if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_after_load();
+         if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_when_loaded();
        }},
   });
 
@@ -345,7 +345,7 @@ void App::open(const std::string& path) {
     deselect(model_);
     loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
   }
-  meter_after_load();
+  meter_when_loaded();
   // A file that is only viewed needs no saving.
   if (!keeps && file_count(model_.scene) == 1) changes_->reset(model_.scene);
 }
