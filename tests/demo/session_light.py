@@ -345,7 +345,7 @@ def test_ocio(s):
     (s.out / "wrong.ocio").write_text("ocio_profile_version: 2\ndisplays: [")
     s.environment["OCIO"] = str(s.out / "config.ocio")
     opened = lambda file: ['click "Open configuration"', "frames 3", f'text "{s.out}/{file}"', "key enter", *SETTLE, "frames 3"]
-    chosen = lambda what: [f'click "{what.split("/")[0]}"', "frames 2", f'click "{what}"', *SETTLE, "frames 3"]
+    chosen = lambda label: [f'click "{label.split("/")[0]}"', "frames 2", f'click "{label}"', *SETTLE, "frames 3"]
     s.play("replay", ["wait loaded", "wait converged", *shown("Render"), *chosen("Tone map/Clip"), *shot("clip"), *opened("config.ocio"), *shot("plain"),
                       *chosen("Display view/Exchanged"), *shot("exchanged"), "key ctrl+z", *SETTLE, *shot("undone"), "key ctrl+shift+z", *SETTLE,
                       *opened("wrong.ocio"), *shot("wrong"), 'click "Remove configuration"', *SETTLE, *shot("removed"),

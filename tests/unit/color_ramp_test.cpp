@@ -207,7 +207,7 @@ TEST_P(ColorRampRendering, DensityColorsAreAlbedos) {
   }
 }
 
-// A furnace: what scatters all light of a color is invisible in it, and what absorbs it follows Beer-Lambert.
+// In a furnace a medium is invisible in colors that it scatters, and follows Beer-Lambert in colors that it absorbs.
 TEST_P(ColorRampRendering, DensityColorsPassTheFurnaceTest) {
   const auto viewer = make();
   viewer->set_light({0.0F, 0.0F, vec3(0.0F), vec3(1.0F)});

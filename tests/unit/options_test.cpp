@@ -226,7 +226,7 @@ TEST(Options, RampIsAListOfPoints) {
             std::string::npos);
 }
 
-// Colors are sRGB as "#rrggbb", or three linear numbers, which may be above 1 for what emits.
+// Colors are sRGB as "#rrggbb", or three linear numbers, which may be above 1 for emission.
 TEST(Options, ColorRampIsAListOfColors) {
   using Stops = cumulet::settings::ColorStops;
   const SceneOptions scene = parse({"--density-color-ramp", "0:#000000,0.5:1/0.5/.25,2:#FFffff",

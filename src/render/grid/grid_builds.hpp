@@ -60,7 +60,7 @@ class GridBuilds {
   [[nodiscard]] double progress() const;
   /// Frees built grids, which were copied or are not needed any more. Lattices are kept.
   void clear_built();
-  /// The same, and ends builds in progress.
+  /// Does clear_built(), and ends builds in progress.
   void stop();
   /// Frees built grids and lattices.
   void clear();
