@@ -315,6 +315,8 @@ def fill(struct: Any, values: Mapping[str, Any]) -> Any:
     filled = struct()
     for name, convert in converters_of(struct).items():
         value = values.get(name)
+        if value is None and any(values.get(one) is not None for one in struct._enables_.get(name, ())):
+            value = True
         if value is None:
             continue
         value = convert(value)
@@ -372,7 +374,10 @@ def matrices(values: Iterable[Any], name: str) -> Any:
 
 
 def groups(size: int, values: Iterable[Any], name: str) -> Any:
-    flat = [numbers(ctypes.c_float, size, value, name) for value in values]
+    try:
+        flat = [numbers(ctypes.c_float, size, value, name) for value in values]
+    except TypeError:
+        raise TypeError(f"{name}: groups of {size} numbers are needed, not {values!r}") from None
     return (ctypes.c_float * (size * len(flat)))(*itertools.chain.from_iterable(flat))
 
 
