@@ -73,6 +73,7 @@ def call(function: Any, *arguments: Any) -> Any:
     else:
         result, cause = checked_types(function, arguments), ""
     if function.restype is ctypes.c_int and result != 0:
+        cause = cause or api.cumulet_last_error(None).decode("utf-8", "replace")
         text = api.cumulet_status_text(result).decode("utf-8")
         raise Error(cause or f"{function.__name__}: {text}", result)
     return result

@@ -184,6 +184,8 @@ class Pictures(unittest.TestCase):
         self.viewer.set_clip(box=False, box_min=(0, 0, 0), box_max=(0, 1, 1))
         with self.assertRaises(cumulet.Error):
             self.viewer.set_clip(planes=[0, 0, 0, 1])
+        with self.assertRaisesRegex(cumulet.Error, "plane 0 has no direction"):
+            cumulet.Instance().set_clip(planes=[0, 0, 0, 1])
         with self.assertRaises(ValueError):
             self.viewer.set_clip(planes=[0, 1, 0])
         self.viewer.set_clip()
