@@ -26,6 +26,8 @@ COUNTS = {"values": ("value_count", 1), "brick_origins": ("brick_count", 3), "br
           "positions": ("vertex_count", 3), "normals": ("vertex_count", 3), "colors": ("vertex_count", 4),
           "velocities": ("vertex_count", 3), "indices": ("index_count", 1), "meshes": ("mesh_count", 1),
           "changed": ("changed_count", 1), "paths": ("count", 1), "planes": ("plane_count", 4)}
+# Flags that are set if members that need them are given: without the flag, the library would ignore these.
+ENABLES = {"cumulet_clip_desc": {"box": ("box_min", "box_max")}}
 # Functions that read the image back: floats per pixel, as an expression.
 READS = {"cumulet_read_linear": "4", "cumulet_read_denoised": "4", "cumulet_read_light_group": "3",
          "cumulet_read_aov": "_support.floats_of(aov)"}
@@ -130,8 +132,9 @@ class Generator:
         flags = ", ".join(f'"{m.name}": bool' for m in struct.members
                           if m.type == "int32_t" and not m.length and m.name not in NUMBERS)
         doc = "\n\n".join([struct.doc, *(f"{m.name}: {m.doc}" for m in struct.members if m.doc)])
+        enables = [f"    _enables_ = {ENABLES[struct.name]!r}"] if struct.name in ENABLES else []
         return [f"class {struct.name}(Struct):", quoted(doc, "    "), f"    _enums_ = {{{enums}}}",
-                f"    _counts_ = {{{counts}}}", f"    _flags_ = {{{flags}}}", "    _fields_ = [",
+                f"    _counts_ = {{{counts}}}", f"    _flags_ = {{{flags}}}", *enables, "    _fields_ = [",
                 *(f"    {field}" for field in fields), "    ]"]
 
     def callback(self, function):

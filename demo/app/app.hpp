@@ -139,6 +139,7 @@ class App {
     bool meter = false;       // measure the exposure when everything is loaded
     bool pick = false;        // the volume being loaded was opened without a grid name
     bool starting = true;     // until the files of the command line are loaded or have failed
+    bool discards = false;    // the user continues without the unsaved changes
     std::string scene;        // scene file
     std::string environment;  // environment map
   };

@@ -14,6 +14,10 @@
 namespace cumulet::demo {
 namespace {
 
+// The status if the system has none, because this program was started so that it ignores the end of children: that of a
+// failure.
+constexpr int lost = 127 << 8;
+
 void set_stream(posix_spawn_file_actions_t& actions, int stream, std::optional<int> descriptor) {
   if (descriptor)
     ::posix_spawn_file_actions_adddup2(&actions, *descriptor, stream);
@@ -43,14 +47,15 @@ std::optional<int> ChildProcess::status() {
   if (status_) return status_;
   int status = 0;
   const pid_t ended = ::waitpid(process_, &status, WNOHANG);
-  if (ended > 0 || (ended < 0 && errno != EINTR)) status_ = status;
+  if (ended > 0) status_ = status;
+  if (ended < 0 && errno != EINTR) status_ = lost;
   return status_;
 }
 
 void ChildProcess::end(int signal) {
   if (status_) return;
   ::kill(process_, signal);
-  int status = 0;
+  int status = lost;
   while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {
   }
   status_ = status;

@@ -24,7 +24,7 @@ class ChildProcess {
   /// Ends the program by SIGTERM if it runs.
   ~ChildProcess();
 
-  /// Returns the program's status, as waitpid does, when it has ended.
+  /// Returns the program's status, as waitpid does, when it has ended. That of a failure if the system has none.
   [[nodiscard]] std::optional<int> status();
   /// Sends the signal and waits until the program has ended.
   void end(int signal);

@@ -7,27 +7,17 @@
 
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <system_error>
 #include <utility>
 
 namespace cumulet::demo {
 namespace {
 
-/// Reads a pipe whose writer has ended. Returns the text without its last line break, and closes the pipe.
-std::string take_text(int pipe) {
-  std::string text;
-  std::array<char, 4096> part{};
-  ssize_t read = 0;
-  while ((read = ::read(pipe, part.data(), part.size())) > 0 || (read < 0 && errno == EINTR))
-    if (read > 0) text.append(part.data(), static_cast<std::size_t>(read));
-  ::close(pipe);
-  if (text.ends_with('\n')) text.pop_back();
-  return text;
-}
-
 /// A pipe whose ends are closed with it, unless they were taken.
 struct Pipe {
-  Pipe() { made = ::pipe2(ends.data(), O_CLOEXEC) == 0; }
+  // Reads do not wait: programs that the writer has started may keep the other end open.
+  Pipe() { made = ::pipe2(ends.data(), O_CLOEXEC) == 0 && ::fcntl(ends[0], F_SETFL, O_NONBLOCK) == 0; }
   Pipe(const Pipe&) = delete;
   Pipe& operator=(const Pipe&) = delete;
   ~Pipe() {
@@ -42,6 +32,26 @@ struct Pipe {
 
 }  // namespace
 
+DesktopDialog::Stream::~Stream() { ::close(pipe_); }
+
+void DesktopDialog::Stream::read() {
+  constexpr std::size_t most = 1 << 16;  // a path is shorter
+  std::array<char, 4096> part{};
+  for (int i = 0; i < 64; ++i) {  // a program may write for ever
+    const ssize_t bytes = ::read(pipe_, part.data(), part.size());
+    if (bytes < 0 && errno == EINTR) continue;
+    if (bytes <= 0) return;
+    text_.append(part.data(), static_cast<std::size_t>(bytes));
+    if (text_.size() > most) text_.erase(0, text_.size() - most);
+  }
+}
+
+std::string DesktopDialog::Stream::text() const {
+  std::string text = text_;
+  if (text.ends_with('\n')) text.pop_back();
+  return text;
+}
+
 bool DesktopDialog::open(const Request& request) {
   Pipe output;
   Pipe errors;
@@ -50,9 +60,9 @@ bool DesktopDialog::open(const Request& request) {
       program_, request.saves ? "save" : "open", request.title, request.parent, request.folder, request.name};
   arguments.insert(arguments.end(), request.extensions.begin(), request.extensions.end());
   try {
-    open_ = Open{
+    open_.emplace(
         std::make_unique<ChildProcess>(std::move(arguments), ChildProcess::Streams{output.ends[1], errors.ends[1]}),
-        output.ends[0], errors.ends[0]};
+        output.ends[0], errors.ends[0]);
   } catch (const std::system_error&) {
     return false;
   }
@@ -63,19 +73,26 @@ bool DesktopDialog::open(const Request& request) {
 std::optional<DesktopDialog::Result> DesktopDialog::take() {
   if (!open_) return std::nullopt;
   const auto status = open_->process->status();
+  // Also while the program runs, or it would wait once a pipe is full.
+  open_->output.read();
+  open_->errors.read();
   return status ? std::optional(end(*status)) : std::nullopt;
 }
 
 DesktopDialog::Result DesktopDialog::end(int status) {
-  constexpr int closed = 1;  // exit status of cumulet-file-dialog
+  constexpr int closed = 1;  // exit statuses of cumulet-file-dialog
+  constexpr int unusable = 4;
   Result result;
-  result.path = take_text(open_->output);
-  result.cause = take_text(open_->errors);
+  result.path = open_->output.text();
+  result.cause = open_->errors.text();
+  result.cause.erase(0, result.cause.rfind('\n') + 1);  // warnings of libraries come before it
   open_.reset();
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && !result.path.empty())
     result.outcome = Result::Outcome::chosen;
   else if (WIFEXITED(status) && WEXITSTATUS(status) == closed)
     result.outcome = Result::Outcome::closed;
+  else if (WIFEXITED(status) && WEXITSTATUS(status) == unusable)
+    result.outcome = Result::Outcome::unusable;
   else if (result.cause.empty())
     result.cause = program_ + " ended unexpectedly";
   return result;

@@ -23,10 +23,10 @@ class DesktopDialog {
     std::vector<std::string> extensions;  // of the listed files
   };
   struct Result {
-    enum class Outcome { chosen, closed, failed };
+    enum class Outcome { chosen, unusable, closed, failed };
     Outcome outcome = Outcome::failed;
     std::string path;   // if chosen
-    std::string cause;  // if failed, one line
+    std::string cause;  // if failed, or if the chosen file is unusable; one line
   };
 
   /// program: path of cumulet-file-dialog.
@@ -44,10 +44,28 @@ class DesktopDialog {
   void close();
 
  private:
+  /// The read end of a pipe, and the text that came through it.
+  class Stream {
+   public:
+    explicit Stream(int pipe) : pipe_(pipe) {}
+    Stream(const Stream&) = delete;
+    Stream& operator=(const Stream&) = delete;
+    ~Stream();
+    /// Reads what is there, without waiting for more.
+    void read();
+    /// Returns the text without its last line break.
+    [[nodiscard]] std::string text() const;
+
+   private:
+    int pipe_;
+    std::string text_;
+  };
   struct Open {
+    Open(std::unique_ptr<ChildProcess> program, int output_pipe, int error_pipe)
+        : process(std::move(program)), output(output_pipe), errors(error_pipe) {}
     std::unique_ptr<ChildProcess> process;
-    int output;  // read end of a pipe
-    int errors;
+    Stream output;
+    Stream errors;
   };
   [[nodiscard]] Result end(int status);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <image.hpp>
+#include <luminance.hpp>
 
 #include "sun_dial.hpp"
 
@@ -15,11 +16,8 @@ Thumbnail expose(std::span<const float> radiance) {
   constexpr double dark = 1e-6;
   constexpr double grey = 0.25;
   double sum = 0.0;
-  for (std::size_t i = 0; i + 2 < radiance.size(); i += 3) {
-    const double luminance = 0.2126 * static_cast<double>(radiance[i]) + 0.7152 * static_cast<double>(radiance[i + 1]) +
-                             0.0722 * static_cast<double>(radiance[i + 2]);
-    sum += std::log(luminance + dark);
-  }
+  for (std::size_t i = 0; i + 2 < radiance.size(); i += 3)
+    sum += std::log(image::luminance(radiance.subspan(i, 3)) + dark);
   const double pixels = std::max(1.0, static_cast<double>(radiance.size()) / 3.0);
   const auto exposure = static_cast<float>(grey / std::exp(sum / pixels));
   Thumbnail made;

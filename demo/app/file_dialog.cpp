@@ -90,6 +90,10 @@ void FileDialog::take_desktop_result(const DesktopDialog::Result& result, std::v
     desktop_.reset();
     return;
   }
+  if (result.outcome == Outcome::unusable) {
+    trouble_ = result.cause;
+    return;
+  }
   path_ = result.path;
   // The desktop has asked about replacing the chosen file, not about the one that has an extension added.
   std::error_code error;

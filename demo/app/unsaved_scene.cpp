@@ -1,3 +1,5 @@
+#include <imgui.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -74,6 +76,10 @@ void App::save_scene(const std::string& path) {
 }
 
 bool App::ask_about_changes(std::vector<Command> commands) {
+  if (loading_.discards) return false;
+  // Includes the change of a control that is still active, and of this frame.
+  changes_->follow(model_.scene, now_);
+  model_.modified = changes_->any();
   if (!model_.modified) return false;
   loading_.waiting = std::move(commands);
   const std::string name = scene_name(model_).substr(1);
@@ -87,7 +93,9 @@ bool App::ask_about_changes(std::vector<Command> commands) {
 void App::discard_changes() {
   // autosave() marks the changes again if another scene cannot be opened.
   model_.modified = false;
+  loading_.discards = true;
   execute_waiting();
+  loading_.discards = false;
 }
 
 void App::execute_waiting() { execute(std::exchange(loading_.waiting, {})); }
@@ -122,9 +130,11 @@ void App::recover() {
 
 void App::autosave() {
   if (!panel_.dialog_open()) loading_.waiting.clear();
-  if (!held_) changes_->follow(model_.scene, now_);
+  // A drag ends soon, but a text field may be active for hours.
+  const bool drags = held_ && !ImGui::GetIO().WantTextInput;
+  if (!drags) changes_->follow(model_.scene, now_);
   model_.modified = changes_->any();
-  if (held_) return;
+  if (drags) return;
   try {
     changes_->autosave(model_.scene, model_.scene_path, now_);
   } catch (const std::exception& error) {

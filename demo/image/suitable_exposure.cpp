@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "luminance.hpp"
+
 namespace cumulet::image {
 namespace {
 
@@ -26,11 +28,7 @@ std::vector<double> block_luminances(std::span<const float> rgba, std::uint32_t 
       const std::uint32_t y1 = std::min(height, y0 + side);
       const std::uint32_t x1 = std::min(width, x0 + side);
       for (std::uint32_t y = y0; y < y1; ++y) {
-        for (std::uint32_t x = x0; x < x1; ++x) {
-          const auto pixel = rgba.subspan(4 * (std::size_t{y} * width + x), 3);
-          sum += 0.2126 * static_cast<double>(pixel[0]) + 0.7152 * static_cast<double>(pixel[1]) +
-                 0.0722 * static_cast<double>(pixel[2]);
-        }
+        for (std::uint32_t x = x0; x < x1; ++x) sum += luminance(rgba.subspan(4 * (std::size_t{y} * width + x), 3));
       }
       if (std::isfinite(sum)) luminances.push_back(sum / ((y1 - y0) * (x1 - x0)));
     }

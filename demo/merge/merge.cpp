@@ -7,6 +7,7 @@
 #include <cmath>
 #include <layers.hpp>
 #include <limits>
+#include <luminance.hpp>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -160,8 +161,6 @@ std::vector<float> mean(const std::vector<Part>& parts, const image::LayerName& 
   return means;
 }
 
-double luminance(std::span<const float> rgba) { return 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]; }
-
 /// Returns the standard error of the mean luminance over all samples. It is combined from the parts' means and sums of
 /// squared deviations (Chan, Golub and LeVeque, "Updating formulae and a pairwise algorithm for computing sample
 /// variances", 1979).
@@ -178,7 +177,7 @@ std::vector<float> error_of(const std::vector<Part>& parts) {
     const auto n = static_cast<double>(part.samples);
     for (std::size_t i = 0; i < all.size(); ++i) {
       Moments& pixel = all[i];
-      const double away = luminance(std::span(rgba).subspan(4 * i, 4)) - pixel.mean;
+      const double away = image::luminance(std::span(rgba).subspan(4 * i, 4)) - pixel.mean;
       const double together = pixel.samples + n;
       if (part.samples > 1) pixel.squares += n * (n - 1.0) * double{errors[i]} * double{errors[i]};
       pixel.squares += away * away * pixel.samples * n / together;
@@ -200,7 +199,7 @@ std::optional<double> noise_of(std::span<const float> rgba, std::span<const floa
   double bright = 0.0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     squares += double{errors[i]} * double{errors[i]};
-    bright += luminance(rgba.subspan(4 * i, 4));
+    bright += image::luminance(rgba.subspan(4 * i, 4));
   }
   const auto pixels = static_cast<double>(errors.size());
   if (pixels == 0.0 || !std::isfinite(squares) || !std::isfinite(bright)) return std::nullopt;

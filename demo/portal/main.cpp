@@ -1,6 +1,6 @@
 // cumulet-file-dialog: shows the file dialog of the desktop through its portal, org.freedesktop.portal.FileChooser, and
 // prints the chosen path. cumulet-demo starts it. Exit status: 0 a file was chosen; 1 the user closed the dialog; 3 the
-// desktop has no portal, or it failed: one line on stderr.
+// desktop has no portal, or it failed; 4 the chosen file is not of this computer. One line on stderr for 3 and 4.
 
 #include <gio/gio.h>
 
@@ -18,6 +18,7 @@ constexpr int chosen = 0;
 constexpr int closed = 1;
 constexpr int wrong_usage = 2;
 constexpr int failed = 3;
+constexpr int unusable = 4;
 
 constexpr const char* portal_name = "org.freedesktop.portal.Desktop";
 constexpr const char* portal_path = "/org/freedesktop/portal/desktop";
@@ -54,13 +55,17 @@ struct Answer {
   Loop loop{g_main_loop_new(nullptr, FALSE)};
   int status = failed;
   std::string path;
+  std::string cause = "cumulet-file-dialog: the portal gave no file";
 };
 
 int report(GError* error) {
-  std::fprintf(stderr, "cumulet-file-dialog: %s\n", error != nullptr ? error->message : "the portal gave no file");
+  std::fprintf(stderr, "cumulet-file-dialog: %s\n", error->message);
   g_clear_error(&error);
   return failed;
 }
+
+/// Returns the text as UTF-8, which D-Bus needs: file names may have other bytes.
+Text valid(const char* text) { return Text(g_utf8_make_valid(text, -1)); }
 
 /// Returns a pattern that matches an extension in any case: "*.[vV][dD][bB]".
 std::string pattern(std::string_view extension) {
@@ -80,12 +85,12 @@ GVariant* filters(std::span<char*> extensions) {
   g_variant_builder_init(&patterns, G_VARIANT_TYPE("a(us)"));
   std::string names;
   for (const char* extension : extensions) {
-    g_variant_builder_add(&patterns, "(us)", 0U, pattern(extension).c_str());
+    g_variant_builder_add(&patterns, "(us)", 0U, valid(pattern(extension).c_str()).get());
     names += (names.empty() ? "" : ", ") + std::string(extension);
   }
   GVariantBuilder list;
   g_variant_builder_init(&list, G_VARIANT_TYPE("a(sa(us))"));
-  g_variant_builder_add(&list, "(sa(us))", names.c_str(), &patterns);
+  g_variant_builder_add(&list, "(sa(us))", valid(names.c_str()).get(), &patterns);
   return g_variant_builder_end(&list);
 }
 
@@ -101,8 +106,26 @@ GVariant* arguments(const Request& request) {
     g_variant_builder_add(&options, "{sv}", "current_folder", g_variant_new_bytestring(folder.c_str()));
   }
   if (request.saves && *request.name != '\0')
-    g_variant_builder_add(&options, "{sv}", "current_name", g_variant_new_string(request.name));
-  return g_variant_new("(ssa{sv})", request.parent, request.title, &options);
+    g_variant_builder_add(&options, "{sv}", "current_name", g_variant_new_string(valid(request.name).get()));
+  return g_variant_new("(ssa{sv})", valid(request.parent).get(), valid(request.title).get(), &options);
+}
+
+/// Takes the file of a URI. Without a place for the host, g_filename_from_uri() would drop it.
+void take_uri(const char* uri, Answer& answer) {
+  char* named = nullptr;
+  const Text path(g_filename_from_uri(uri, &named, nullptr));
+  const Text host(named);
+  const std::string_view of = host == nullptr ? "" : host.get();
+  if (path != nullptr && (of.empty() || of == "localhost" || of == g_get_host_name())) {
+    answer.status = chosen;
+    answer.path = path.get();
+    return;
+  }
+  answer.status = unusable;
+  answer.cause = uri;
+  std::ranges::replace_if(
+      answer.cause, [](char c) { return g_ascii_iscntrl(c) != 0; }, '?');
+  answer.cause += ": is not a file of this computer";
 }
 
 void take_response(GDBusConnection* /*connection*/, const char* /*sender*/, const char* /*object*/,
@@ -120,10 +143,13 @@ void take_response(GDBusConnection* /*connection*/, const char* /*sender*/, cons
   if (uris == nullptr || g_variant_n_children(uris.get()) == 0) return;
   const char* uri = nullptr;
   g_variant_get_child(uris.get(), 0, "&s", &uri);
-  const Text path(g_filename_from_uri(uri, nullptr, nullptr));
-  if (path == nullptr) return;
-  answer.path = path.get();
-  answer.status = chosen;
+  take_uri(uri, answer);
+}
+
+void take_end(GDBusConnection* /*connection*/, const char* /*name*/, void* user) {
+  auto& answer = *static_cast<Answer*>(user);
+  g_main_loop_quit(answer.loop.get());
+  answer.cause = "cumulet-file-dialog: the portal has ended";
 }
 
 guint subscribe(GDBusConnection* bus, const char* object, Answer& answer) {
@@ -156,8 +182,12 @@ int show(const Request& request) {
     g_dbus_connection_signal_unsubscribe(bus.get(), expected);
     subscribe(bus.get(), actual, answer);
   }
+  // A portal that crashes sends no response.
+  const guint watch = g_bus_watch_name_on_connection(bus.get(), portal_name, G_BUS_NAME_WATCHER_FLAGS_NONE, nullptr,
+                                                     take_end, &answer, nullptr);
   g_main_loop_run(answer.loop.get());
-  if (answer.status == failed) return report(nullptr);
+  g_bus_unwatch_name(watch);
+  if (answer.status == failed || answer.status == unusable) std::fprintf(stderr, "%s\n", answer.cause.c_str());
   if (answer.status == chosen) std::puts(answer.path.c_str());
   return answer.status;
 }

@@ -1,9 +1,9 @@
 #include "fire.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
+#include <grid_names.hpp>
 #include <memory>
 #include <presets.hpp>
 #include <scene_file.hpp>
@@ -36,11 +36,7 @@ cumulet_volume_info info_of(const cumulet_volume* volume) {
   return info;
 }
 
-// Names by which the library finds a temperature or a flame (docs/grids.md). A fire that is missed here costs only
-// time.
-constexpr std::array<std::string_view, 8> fire_names = {"temperature", "heat", "temp", "flame",
-                                                        "flames",      "fire", "burn", "fuel"};
-
+// A fire that is missed here costs only time.
 bool names_fire(const cumulet_volume_file_desc& file) {
   const auto named = [](const char* grid) {
     return grid != nullptr && *grid != '\0' && std::string_view(grid) != "none";
@@ -50,7 +46,8 @@ bool names_fire(const cumulet_volume_file_desc& file) {
   const auto look = [](void* user, const char* name, const char*, const char*) {
     std::string lower = name;
     std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (std::ranges::find(fire_names, lower) != fire_names.end()) *static_cast<bool*>(user) = true;
+    const auto is_in = [&](const auto& names) { return std::ranges::find(names, lower) != names.end(); };
+    if (is_in(settings::temperature_names) || is_in(settings::flame_names)) *static_cast<bool*>(user) = true;
   };
   return cumulet_list_grids(file.path, look, &found, nullptr, 0) == CUMULET_OK && found;
 }

@@ -2,7 +2,6 @@
 
 #include <cumulet/cumulet.h>
 
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -10,6 +9,8 @@
 #include <ostream>
 #include <program.hpp>
 #include <stdexcept>
+
+#include "library_call.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -23,16 +24,11 @@ struct Release {
 template <class Handle>
 using Owner = std::unique_ptr<Handle, Release>;
 
-void check(cumulet_status status) {
-  if (status != CUMULET_OK) throw std::runtime_error(cumulet_status_text(status));
-}
-
 /// Opens a file with one of the library's functions. Throws with the library's error text.
 template <class Handle>
 Owner<Handle> open(cumulet_status (*opener)(const char*, Handle**, char*, std::size_t), const std::string& path) {
-  std::array<char, 1024> error{};
   Handle* handle = nullptr;
-  if (opener(path.c_str(), &handle, error.data(), error.size()) != CUMULET_OK) throw std::runtime_error(error.data());
+  check_call(opener(path.c_str(), &handle, nullptr, 0));
   return Owner<Handle>(handle);
 }
 
@@ -41,7 +37,7 @@ template <class Desc, class Get, class... Which>
 Desc read_desc(Get get, Which... which) {
   Desc desc{};
   desc.struct_size = sizeof desc;
-  check(get(which..., &desc));
+  check_call(get(which..., &desc));
   return desc;
 }
 

@@ -1,7 +1,6 @@
 #include "instances.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <settings.hpp>
 #include <stdexcept>
@@ -9,13 +8,10 @@
 #include <utility>
 
 #include "fire.hpp"
+#include "library_call.hpp"
 
 namespace cumulet::demo {
 namespace {
-
-void check(cumulet_status status, const char* cause) {
-  if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
-}
 
 /// Returns the scene's medium. If the scene does not set the density scale, it is taken from the volume, or the whole
 /// medium is that of a fire.
@@ -66,8 +62,7 @@ OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_use
   desc.log = log;
   desc.log_user = log_user;
   cumulet_volume* opened = nullptr;
-  std::array<char, 1024> error{};
-  check(cumulet_volume_open_file(&desc, &opened, error.data(), error.size()), error.data());
+  check_call(cumulet_volume_open_file(&desc, &opened, nullptr, 0));
   return look_into({opened, cumulet_volume_release});
 }
 
@@ -83,8 +78,7 @@ std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& 
   desc.file = &file;
   desc.memory_bytes = memory_bytes;
   cumulet_sequence* made = nullptr;
-  std::array<char, 1024> error{};
-  check(cumulet_sequence_create(&desc, &made, error.data(), error.size()), error.data());
+  check_call(cumulet_sequence_create(&desc, &made, nullptr, 0));
   return {made, cumulet_sequence_release};
 }
 
@@ -122,11 +116,10 @@ std::shared_ptr<cumulet_sequence> Instances::sequence_of(const SceneVolume& scen
   if (found != playing_.end()) return found->sequence;
   std::shared_ptr<cumulet_sequence> sequence = open_sequence(row.files(), volume_file(scene));
   const cumulet_playback_desc playback = playback_of(scene.sequence, row);
-  check(cumulet_sequence_set_playback(sequence.get(), &playback), "");
+  check_call(cumulet_sequence_set_playback(sequence.get(), &playback));
   const Moment moment = scene.sequence.frame.value_or(row.number(playback.first_frame));
-  check(seconds_ ? cumulet_sequence_set_time(sequence.get(), *seconds_)
-                 : cumulet_sequence_set_frame(sequence.get(), row.position_of(moment)),
-        "");
+  check_call(seconds_ ? cumulet_sequence_set_time(sequence.get(), *seconds_)
+                      : cumulet_sequence_set_frame(sequence.get(), row.position_of(moment)));
   playing_.push_back({scene, scene.sequence, sequence});
   return sequence;
 }
@@ -134,7 +127,7 @@ std::shared_ptr<cumulet_sequence> Instances::sequence_of(const SceneVolume& scen
 void Instances::go_to(double seconds) {
   if (seconds_ == seconds) return;
   seconds_ = seconds;
-  for (const Playing& playing : playing_) check(cumulet_sequence_set_time(playing.sequence.get(), seconds), "");
+  for (const Playing& playing : playing_) check_call(cumulet_sequence_set_time(playing.sequence.get(), seconds));
 }
 
 void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& volumes) {
@@ -148,16 +141,15 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     desc.tag = count + 1;
     if (count == shown_.size()) {
       cumulet_instance* made = nullptr;
-      std::array<char, 1024> error{};
-      check(cumulet_instance_create(&desc, &made, error.data(), error.size()), error.data());
+      check_call(cumulet_instance_create(&desc, &made, nullptr, 0), nullptr, scene.volume);
       std::shared_ptr<cumulet_instance> instance(made, cumulet_instance_release);
-      check(cumulet_add_instance(viewer, made), cumulet_last_error(viewer));
+      check_call(cumulet_add_instance(viewer, made), viewer);
       shown_.push_back({std::move(instance), desc, open.volume, sequence, *desc.medium, {}, {}, {}, indices});
     }
     Shown& shown = shown_[count++];
     if (shown.volume != open.volume || shown.sequence != sequence || !settings::same(shown.medium, *desc.medium) ||
         !same_instance(shown.desc, desc))
-      check(cumulet_instance_set(shown.instance.get(), &desc), "");
+      check_call(cumulet_instance_set(shown.instance.get(), &desc), nullptr, scene.volume);
     shown.desc = desc;
     shown.desc.medium = nullptr;  // `medium` points to a local variable of the caller; a copy is stored below
     shown.volume = open.volume;
@@ -166,21 +158,22 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     shown.indices = indices;
     for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
       if (shown.ramps[i] == scene.ramps[i]) continue;
-      check(cumulet_instance_set_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
-                                      settings::numbers_of(scene.ramps[i]), scene.ramps[i].size()),
-            "");
+      check_call(cumulet_instance_set_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
+                                           settings::numbers_of(scene.ramps[i]), scene.ramps[i].size()),
+                 nullptr, scene.volume);
       shown.ramps[i] = scene.ramps[i];
     }
     for (std::size_t i = 0; i < scene.color_ramps.size(); ++i) {
       if (shown.color_ramps[i] == scene.color_ramps[i]) continue;
-      check(cumulet_instance_set_color_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
-                                            settings::numbers_of(scene.color_ramps[i]), scene.color_ramps[i].size()),
-            "");
+      check_call(
+          cumulet_instance_set_color_ramp(shown.instance.get(), static_cast<cumulet_ramp>(i),
+                                          settings::numbers_of(scene.color_ramps[i]), scene.color_ramps[i].size()),
+          nullptr, scene.volume);
       shown.color_ramps[i] = scene.color_ramps[i];
     }
     if (shown.clip != scene.clip) {
       const cumulet_clip_desc clip = settings::clip_desc_of(scene.clip);
-      check(cumulet_instance_set_clip(shown.instance.get(), &clip), "");
+      check_call(cumulet_instance_set_clip(shown.instance.get(), &clip), nullptr, scene.volume);
       shown.clip = scene.clip;
     }
   };
@@ -211,7 +204,7 @@ void Instances::show(cumulet_viewer* viewer, const std::vector<SceneVolume>& vol
     });
   });
   while (shown_.size() > count) {
-    check(cumulet_remove_instance(viewer, shown_.back().instance.get()), cumulet_last_error(viewer));
+    check_call(cumulet_remove_instance(viewer, shown_.back().instance.get()), viewer);
     shown_.pop_back();
   }
 }

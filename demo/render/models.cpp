@@ -1,7 +1,6 @@
 #include "models.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <sstream>
@@ -9,18 +8,16 @@
 #include <string>
 #include <utility>
 
+#include "library_call.hpp"
+
 namespace cumulet::demo {
 namespace {
-
-void check(cumulet_status status, const char* cause) {
-  if (status != CUMULET_OK) throw std::runtime_error(*cause != '\0' ? cause : cumulet_status_text(status));
-}
 
 /// Throws if the surfaces do not have the requested animation or material variant.
 cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, std::uint64_t tag) {
   cumulet_surfaces_info info{};
   info.struct_size = sizeof info;
-  check(cumulet_surfaces_get_info(surfaces, &info), "");
+  check_call(cumulet_surfaces_get_info(surfaces, &info));
   const std::string refusal = animation_refusal(scene.file, scene.animation, info.animations);
   if (!refusal.empty()) throw std::runtime_error(refusal);
   cumulet_model_desc desc{};
@@ -44,12 +41,11 @@ cumulet_model_desc desc_of(const SceneModel& scene, cumulet_surfaces* surfaces, 
 
 SurfacesPtr open_surfaces(const std::string& file, cumulet_log_fn log, void* log_user) {
   cumulet_surfaces* opened = nullptr;
-  std::array<char, 1024> error{};
-  check(cumulet_surfaces_open(file.c_str(), &opened, error.data(), error.size()), error.data());
+  check_call(cumulet_surfaces_open(file.c_str(), &opened, nullptr, 0));
   SurfacesPtr surfaces(opened, cumulet_surfaces_release);
   cumulet_surfaces_info info{};
   info.struct_size = sizeof info;
-  check(cumulet_surfaces_get_info(opened, &info), "");
+  check_call(cumulet_surfaces_get_info(opened, &info));
   std::istringstream lines(info.warnings);
   for (std::string line; std::getline(lines, line);) log(log_user, CUMULET_LOG_WARNING, line.c_str());
   return surfaces;
@@ -95,14 +91,12 @@ void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models)
       const cumulet_model_desc desc = desc_of(scene, given->surfaces.get(), i + 1);
       if (count == shown_.size()) {
         cumulet_model* made = nullptr;
-        std::array<char, 1024> error{};
-        check(cumulet_model_create(&desc, &made, error.data(), error.size()),
-              (scene.file + ": " + error.data()).c_str());
+        check_call(cumulet_model_create(&desc, &made, nullptr, 0), nullptr, scene.file);
         std::shared_ptr<cumulet_model> model(made, cumulet_model_release);
-        check(cumulet_add_model(viewer, made), cumulet_last_error(viewer));
+        check_call(cumulet_add_model(viewer, made), viewer);
         shown_.push_back({std::move(model), {}, nullptr});
       } else {
-        check(cumulet_model_set(shown_[count].model.get(), &desc), (scene.file + ": its transform is invalid").c_str());
+        check_call(cumulet_model_set(shown_[count].model.get(), &desc), nullptr, scene.file);
       }
     } catch (const std::runtime_error& error) {
       refusal = error.what();
@@ -113,7 +107,7 @@ void Models::show(cumulet_viewer* viewer, const std::vector<SceneModel>& models)
     ++count;
   }
   while (shown_.size() > count) {
-    check(cumulet_remove_model(viewer, shown_.back().model.get()), cumulet_last_error(viewer));
+    check_call(cumulet_remove_model(viewer, shown_.back().model.get()), viewer);
     shown_.pop_back();
   }
   if (!refusal.empty()) throw std::runtime_error(refusal);

@@ -210,7 +210,8 @@ void end_shutter(SceneOptions& scene);
 /// scene file's folder or below it get relative names.
 [[nodiscard]] std::string scene_text(const SceneOptions& scene, const std::string& path,
                                      SceneFormat format = SceneFormat::third);
-/// Writes the file atomically: on failure the old file remains. Throws as parse_scene.
+/// Writes the file atomically: on failure the old file remains. Throws as parse_scene, also for a file whose name is
+/// not UTF-8, in which scene_text() replaces what is invalid.
 void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format = SceneFormat::third);
 
 /// Returns true if both scenes have the same content. The displayed frame is ignored.

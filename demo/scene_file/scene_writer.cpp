@@ -289,6 +289,15 @@ fs::path folder_of(const std::string& path) {
   return error ? fs::path(path).parent_path() : absolute.parent_path();
 }
 
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(Json(text).dump());
+    return true;
+  } catch (const Json::type_error&) {
+    return false;
+  }
+}
+
 /// Returns a file name as it is written into the scene file at `path`: relative if the file is in that folder or below
 /// it.
 std::string portable_file(const std::string& file, const std::string& path) {
@@ -311,13 +320,19 @@ const NamedCamera* looked_through(const SceneOptions& scene) {
 }
 
 std::string scene_text(const SceneOptions& scene, const std::string& path, SceneFormat format) {
-  // A file name may have any encoding: invalid UTF-8 is replaced instead of throwing.
+  // A file name may have any encoding: invalid UTF-8 is replaced instead of throwing. save_scene() refuses it.
   return to_json(scene, format, [&](const std::string& file) { return portable_file(file, path); })
              .dump(2, ' ', false, Json::error_handler_t::replace) +
          "\n";
 }
 
 void save_scene(const SceneOptions& scene, const std::string& path, SceneFormat format) {
+  const auto checked = [&](const std::string& file) {
+    std::string name = portable_file(file, path);
+    if (!is_utf8(name)) throw std::runtime_error(path + ": cannot name " + name + ", because that is not UTF-8");
+    return name;
+  };
+  static_cast<void>(to_json(scene, format, checked));
   image::replace_file(path, scene_text(scene, path, format));
 }
 

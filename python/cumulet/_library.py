@@ -17,6 +17,7 @@ class Struct(ctypes.Structure):
     _enums_: Dict[str, Any] = {}  # the enum of a field
     _counts_: Dict[str, Tuple[str, int]] = {}  # the field with the length of an array, and elements per count
     _flags_: Dict[str, type] = {}  # fields of int32_t that are 0 or 1
+    _enables_: Dict[str, Tuple[str, ...]] = {}  # flags that are 1 by default if one of these fields is given
 
     def __init__(self, **values):
         super().__init__(**values)

@@ -73,6 +73,7 @@ def call(function: Any, *arguments: Any) -> Any:
     else:
         result, cause = checked_types(function, arguments), ""
     if function.restype is ctypes.c_int and result != 0:
+        cause = cause or api.cumulet_last_error(None).decode("utf-8", "replace")
         text = api.cumulet_status_text(result).decode("utf-8")
         raise Error(cause or f"{function.__name__}: {text}", result)
     return result
@@ -315,6 +316,8 @@ def fill(struct: Any, values: Mapping[str, Any]) -> Any:
     filled = struct()
     for name, convert in converters_of(struct).items():
         value = values.get(name)
+        if value is None and any(values.get(one) is not None for one in struct._enables_.get(name, ())):
+            value = True
         if value is None:
             continue
         value = convert(value)
@@ -372,7 +375,10 @@ def matrices(values: Iterable[Any], name: str) -> Any:
 
 
 def groups(size: int, values: Iterable[Any], name: str) -> Any:
-    flat = [numbers(ctypes.c_float, size, value, name) for value in values]
+    try:
+        flat = [numbers(ctypes.c_float, size, value, name) for value in values]
+    except TypeError:
+        raise TypeError(f"{name}: groups of {size} numbers are needed, not {values!r}") from None
     return (ctypes.c_float * (size * len(flat)))(*itertools.chain.from_iterable(flat))
 
 

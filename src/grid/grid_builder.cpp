@@ -493,7 +493,7 @@ TetGrid GridBuilder::records(CellKind cells, float max_value, const Channels& ch
     if (row.is_in(channels)) row.resize(grid.channels, count, allocation);
   }
   if (channels.ends) allocation.resize(grid.change, count);
-  const bool has_corners = cells == CellKind::trilinear && statistics_->interpolates();
+  const bool has_corners = grid::has_corners(cells, statistics_->cube().interpolation);
   if (has_corners) allocation.resize(grid.corners, count);
   number_nodes(grid, allocation);
 

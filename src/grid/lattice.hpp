@@ -81,9 +81,7 @@ struct Lattice {
     return cube.interpolation == Interpolation::linear ? BrickCorners().size() : volume::brick_voxels;
   }
   /// Whether its grids have TetGrid::corners.
-  [[nodiscard]] bool has_corners() const {
-    return cells == CellKind::trilinear && cube.interpolation == Interpolation::linear;
-  }
+  [[nodiscard]] bool has_corners() const { return grid::has_corners(cells, cube.interpolation); }
   [[nodiscard]] std::uint32_t top_scale() const { return static_cast<std::uint32_t>(cube.log2_size) / 3; }
   /// Main memory in bytes, without the volume's.
   [[nodiscard]] std::uint64_t bytes() const {

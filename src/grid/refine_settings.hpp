@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "grid/cube.hpp"
+
 namespace cumulet::grid {
 
 /// Refinement criterion: the error indicator of a cell that is compared with the threshold. s is the standard deviation
@@ -24,6 +26,10 @@ enum class Criterion { deviation = 0, range_mean = 1, transmittance = 2 };
 /// the interpolated field itself; without interpolation between voxels as linear.
 enum class CellKind { linear, constant, trilinear };
 constexpr bool has_fits(CellKind cells) { return cells != CellKind::constant; }
+/// Whether the finest cells have the interpolated field itself (TetGrid::corners).
+constexpr bool has_corners(CellKind cells, Interpolation interpolation) {
+  return cells == CellKind::trilinear && interpolation == Interpolation::linear;
+}
 
 /// A pinhole camera for adaptive refinement, in world space.
 struct RefineCamera {

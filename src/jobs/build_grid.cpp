@@ -44,11 +44,6 @@ double density_scale_in(double unit, const volume::ScalarVolume& voxels, const g
 
 bool interpolates(const BuildSettings& settings) { return settings.interpolation == grid::Interpolation::linear; }
 
-// Whether tetrahedra have grid::TetGrid::corners.
-bool has_corners(const BuildSettings& settings) {
-  return settings.refine.cells == grid::CellKind::trilinear && interpolates(settings);
-}
-
 // Returns whether the GPU builds a tetrahedral grid; logs the reason if the CPU builds it instead.
 bool builds_on_gpu(const Log& log, const VolumeAsset& volume, const BuildSettings& settings, bool moves) {
   if (settings.on != BuildOn::gpu) return false;
@@ -107,7 +102,7 @@ Built build_grid(const Log& log, const VolumeAssetPtr& volume, const BuildSettin
     return built;
   }
   const bool on_gpu = builds_on_gpu(log, *volume, settings, moving != nullptr);
-  const Carried carried = Carried::of(channels, has_corners(settings));
+  const Carried carried = Carried::of(channels, grid::has_corners(settings.refine.cells, settings.interpolation));
   const std::uint64_t max_cells = settings.refine.max_cells;
   grid::RefineSettings refine = settings.refine;
   refine.density_scale = density_scale_in(unit, *voxels, statistics->cube(), settings.refine.density_scale);

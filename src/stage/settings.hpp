@@ -25,11 +25,12 @@ static_assert(static_cast<int>(grid::Criterion::transmittance) == CUMULET_CRITER
 
 static_assert(static_cast<int>(BuildOn::gpu) == CUMULET_BUILD_GPU);
 
-// Trilinear cells need interpolation between voxels.
+// Trilinear cells without corners are linear ones, with which they share grids.
 inline grid::CellKind cells_of(cumulet_cell_density cells, grid::Interpolation interpolation) {
-  if (cells == CUMULET_CELLS_CONSTANT) return grid::CellKind::constant;
-  const bool trilinear = cells == CUMULET_CELLS_TRILINEAR && interpolation == grid::Interpolation::linear;
-  return trilinear ? grid::CellKind::trilinear : grid::CellKind::linear;
+  using grid::CellKind;
+  if (cells == CUMULET_CELLS_CONSTANT) return CellKind::constant;
+  const bool trilinear = cells == CUMULET_CELLS_TRILINEAR;
+  return trilinear && grid::has_corners(CellKind::trilinear, interpolation) ? CellKind::trilinear : CellKind::linear;
 }
 
 struct GridSettings {

@@ -174,7 +174,7 @@ void cumulet_destroy(cumulet_viewer* viewer) {
 
 const char* cumulet_last_error(const cumulet_viewer* viewer) {
   if (cumulet::CallbackScope::inside()) return inside_callback;
-  return viewer == nullptr ? "viewer is NULL" : viewer->last_errors.get();
+  return viewer == nullptr ? cumulet::c_abi::thread_line() : viewer->last_errors.get();
 }
 
 cumulet_status cumulet_attach(cumulet_viewer* viewer, cumulet_get_proc_fn get_proc, void* get_proc_user) {

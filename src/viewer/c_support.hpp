@@ -95,11 +95,15 @@ inline void copy_text(std::string_view text, char* to, size_t size) {
   to[length] = '\0';
 }
 
+/// The line of this thread's last call without a viewer. Threads may use one handle, and handles are small.
+void set_thread_line(std::string_view line) noexcept;
+[[nodiscard]] const char* thread_line() noexcept;
+
 inline constexpr const char* inside_callback = "called from inside a callback";
 inline constexpr const char* process_exits = "the process is exiting";
 
-/// Runs a call; writes the message to the caller's buffer. Refuses calls from inside a callback and while the process
-/// exits.
+/// Runs a call without a viewer; writes the message to the caller's buffer and to thread_line(). Refuses calls from
+/// inside a callback and while the process exits.
 template <class Call>
 cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
   if (CallbackScope::inside()) {
@@ -109,11 +113,13 @@ cumulet_status guarded(char* error, size_t error_size, Call&& call) noexcept {
   const HostCall host_call;
   if (host_call.refused()) {
     copy_text(process_exits, error, error_size);
+    set_thread_line(process_exits);
     return CUMULET_ERROR_CANCELLED;
   }
   std::string message;
   const cumulet_status status = guarded(message, std::forward<Call>(call));
   copy_text(message, error, error_size);
+  set_thread_line(message);
   return status;
 }
 

@@ -68,7 +68,11 @@ namespace cumulet::c_abi {
 template <class Call>
 cumulet_status guarded(cumulet_viewer* viewer, Call&& call) noexcept {
   // Inside a callback the last error stays that of the call which runs the callback.
-  if (viewer == nullptr || CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
+  if (CallbackScope::inside()) return CUMULET_ERROR_INVALID_ARGUMENT;
+  if (viewer == nullptr) {
+    set_thread_line("viewer is NULL");
+    return CUMULET_ERROR_INVALID_ARGUMENT;
+  }
   const HostCall host_call;
   std::string message;
   const cumulet_status status = guarded(message, [&] {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/number_text.hpp"
+#include "settings/grid_names.hpp"
 #include "volume/bricks.hpp"
 #include "volume/coarse_reader.hpp"
 #include "volume/resample.hpp"
@@ -19,8 +20,8 @@ using namespace detail;
 
 namespace {
 
-constexpr std::array<std::string_view, 3> temperature_names = {"temperature", "heat", "temp"};
-constexpr std::array<std::string_view, 5> flame_names = {"flame", "flames", "fire", "burn", "fuel"};
+using settings::flame_names;
+using settings::temperature_names;
 constexpr std::array<std::string_view, 3> color_names = {"cd", "color", "colour"};
 constexpr std::array<std::string_view, 4> anisotropy_names = {"anisotropy", "scatter_anisotropy", "phase_anisotropy",
                                                               "phase_g"};

@@ -1,6 +1,8 @@
 // The file dialogs of cumulet-demo: the list of a folder, and the program that shows the desktop's dialog.
 
 #include <gtest/gtest.h>
+#include <signal.h>  // NOLINT(modernize-deprecated-headers): kill() and SIGCHLD are of POSIX
+#include <sys/types.h>
 
 #include <chrono>
 #include <filesystem>
@@ -154,6 +156,48 @@ TEST_F(DesktopDialogTest, TellsAClosedDialogFromAFailure) {
   EXPECT_NE(result_of(killed).cause.find("ended unexpectedly"), std::string::npos);
   DesktopDialog missing((folder_ / "nothing").string());
   EXPECT_FALSE(missing.open({}));
+}
+
+TEST_F(DesktopDialogTest, TellsAChoiceThatCannotBeUsed) {
+  DesktopDialog dialog(script("echo 'smb://a/b.vdb: is not a file of this computer' >&2; exit 4"));
+  ASSERT_TRUE(dialog.open({}));
+  const auto result = result_of(dialog);
+  EXPECT_EQ(result.outcome, Outcome::unusable);
+  EXPECT_EQ(result.cause, "smb://a/b.vdb: is not a file of this computer");
+}
+
+// Libraries may write any number of warnings.
+TEST_F(DesktopDialogTest, AProgramThatWritesMuchEnds) {
+  DesktopDialog dialog(script("head -c 300000 /dev/zero | tr '\\0' 'w' >&2; echo /a.vdb"));
+  ASSERT_TRUE(dialog.open({}));
+  const auto result = result_of(dialog);
+  EXPECT_EQ(result.outcome, Outcome::chosen);
+  EXPECT_EQ(result.path, "/a.vdb");
+  DesktopDialog failing(script("for i in 1 2 3; do echo \"warning $i\" >&2; done; echo 'no portal' >&2; exit 3"));
+  ASSERT_TRUE(failing.open({}));
+  EXPECT_EQ(result_of(failing).cause, "no portal");
+}
+
+// For example a message bus that it has started.
+TEST_F(DesktopDialogTest, WaitsForNoProgramThatItLeavesBehind) {
+  const auto began = std::chrono::steady_clock::now();
+  DesktopDialog dialog(script("sleep 60 & echo $! > \"$0.left\"; echo /a.vdb"));
+  ASSERT_TRUE(dialog.open({}));
+  EXPECT_EQ(result_of(dialog).path, "/a.vdb");
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(30));
+  pid_t left = 0;
+  std::ifstream(folder_ / "dialog.left") >> left;
+  ASSERT_GT(left, 0);
+  ::kill(left, SIGKILL);
+}
+
+// Its parent may have started this program so that it ignores the end of children.
+TEST_F(DesktopDialogTest, AStatusThatIsLostIsAFailure) {
+  const auto before = ::signal(SIGCHLD, SIG_IGN);
+  DesktopDialog dialog(script("exit 1"));
+  ASSERT_TRUE(dialog.open({}));
+  EXPECT_EQ(result_of(dialog).outcome, Outcome::failed);
+  ::signal(SIGCHLD, before);
 }
 
 TEST_F(DesktopDialogTest, ClosingEndsTheProgram) {

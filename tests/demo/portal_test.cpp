@@ -84,6 +84,11 @@ class PortalTest : public testing::Test {
       if (c == '.') c = '_';
     const std::string handle = "/org/freedesktop/portal/desktop/request/" + name + "/cumulet";
     g_dbus_method_invocation_return_value(invocation, g_variant_new("(o)", handle.c_str()));
+    if (test.crashes_) {
+      g_dbus_connection_flush_sync(connection, nullptr, nullptr);  // the reply
+      g_dbus_connection_close(connection, nullptr, nullptr, nullptr);
+      return;
+    }
     GVariantBuilder results;
     g_variant_builder_init(&results, G_VARIANT_TYPE_VARDICT);
     if (test.response_ == 0) {
@@ -110,6 +115,7 @@ class PortalTest : public testing::Test {
   std::string address_;
   GDBusConnection* connection_ = nullptr;
   guint32 response_ = 0;
+  bool crashes_ = false;  // while its dialog is open
   std::string uri_ = "file:///a%20b/c%231.vdb";
   std::string method_;
   std::string parameters_;
@@ -145,9 +151,38 @@ TEST_F(PortalTest, TellsCancellingFromAFailure) {
   const auto failed = ask({});
   EXPECT_EQ(failed.outcome, Outcome::failed);
   EXPECT_EQ(failed.cause, "cumulet-file-dialog: the portal gave no file");
-  response_ = 0;
-  uri_ = "https://example.org/cloud.vdb";
-  EXPECT_EQ(ask({}).outcome, Outcome::failed) << "not a local file";
+}
+
+TEST_F(PortalTest, TakesLocalFilesOnly) {
+  offer_portal();
+  uri_ = "file://localhost/a%FF%0Ab.vdb";
+  const auto local = ask({});
+  EXPECT_EQ(local.outcome, Outcome::chosen) << local.cause;
+  EXPECT_EQ(local.path, "/a\xff\nb.vdb") << "the bytes of the file's name";
+  uri_ = std::string("file://") + g_get_host_name() + "/cloud.vdb";
+  EXPECT_EQ(ask({}).path, "/cloud.vdb");
+  for (const char* uri : {"file://another.example/cloud.vdb", "smb://server/cloud.vdb", "https://example.org/cloud.vdb",
+                          "file:///a%2Fb.vdb", "file:///a%00.vdb", "cloud.vdb", ""}) {
+    uri_ = uri;
+    const auto result = ask({});
+    EXPECT_EQ(result.outcome, Outcome::unusable) << uri;
+    EXPECT_EQ(result.cause, uri + std::string(": is not a file of this computer"));
+  }
+}
+
+TEST_F(PortalTest, SuggestsANameThatIsNotUtf8) {
+  offer_portal();
+  const auto result = ask({true, "Save \xff", "", "", "wolke\xe9.json", {".json"}});
+  EXPECT_EQ(result.outcome, Outcome::chosen) << result.cause;
+  EXPECT_NE(parameters_.find("'current_name': <'wolke\xef\xbf\xbd.json'>"), std::string::npos) << parameters_;
+}
+
+TEST_F(PortalTest, APortalThatEndsClosesTheDialog) {
+  offer_portal();
+  crashes_ = true;
+  const auto result = ask({});
+  EXPECT_EQ(result.outcome, Outcome::failed);
+  EXPECT_EQ(result.cause, "cumulet-file-dialog: the portal has ended");
 }
 
 TEST_F(PortalTest, WithoutAPortalTheCauseIsOneLine) {

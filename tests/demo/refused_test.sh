@@ -10,7 +10,7 @@ fail() { echo "refused_test: $*" >&2; exit 1; }
 
 refused() {
   local status=0
-  "$render" --gltf "$model" "${@:2}" --size 32x24 --spp 1 -o "$work/picture.png" >"$work/out" 2>"$work/error" || status=$?
+  "$render" "${@:2}" --size 32x24 --spp 1 -o "$work/picture.png" >"$work/out" 2>"$work/error" || status=$?
   [ "$status" = 1 ] || fail "exit status $status: $(cat "$work/error")"
   [ ! -s "$work/out" ] || fail "said $(cat "$work/out")"
   [ "$(wc -l <"$work/error")" = 1 ] || fail "not one line: $(cat "$work/error")"
@@ -18,5 +18,9 @@ refused() {
   [ ! -e "$work/picture.png" ] || fail "there is a picture"
 }
 
-refused "no animation 99; the file has 1" --gltf-animation 99
-refused 'no material variant "night"; the file has none' --gltf-variant night
+refused "no animation 99; the file has 1" --gltf "$model" --gltf-animation 99
+refused 'no material variant "night"; the file has none' --gltf "$model" --gltf-variant night
+# The second model: the library refuses its transform.
+echo "{\"cumulet_scene\": 3, \"models\": [{\"file\": \"$model\"}, {\"file\": \"$model\",
+      \"to_world\": [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}]}" >"$work/flat.json"
+refused "cumulet_model_desc.to_world is singular" --scene "$work/flat.json"

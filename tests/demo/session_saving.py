@@ -6,7 +6,7 @@ import signal
 import subprocess
 import time
 
-from demo_session import SIZE, shot
+from demo_session import SIZE, shot, shown
 
 SAVE_AS = ["frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3"]
 
@@ -51,6 +51,11 @@ def test_unsaved(s):
     assert not list((s.out / "state").glob("cumulet/*.json")), "nothing is left after a normal end"
     recent = json.loads((s.out / "config/cumulet/demo.json").read_text())["recent"]
     assert [os.path.basename(file) for file in recent if file.endswith(".json")] == ["other.json", "scene.json"], recent
+    # The user still holds the slider when the window is closed.
+    s.play("held", ["frames 3", *shown("Render"), 'move "Exposure" 0.8 0.5', "down", "frames 2", "close", "frames 3", *shot("held"),
+                    "up", "frames 2", 'click "Question/Discard"', "frames 30", 'screenshot "never.png"'])
+    assert report("held")["question"] == "Unsaved changes"
+    assert not (s.out / "never.png").exists(), "the changes are discarded"
 
 
 def killed(s, name, *arguments):

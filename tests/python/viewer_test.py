@@ -166,6 +166,9 @@ class Pictures(unittest.TestCase):
         self.viewer.set_color_ramp("density", [(0, 0, 0, 0), (1, 1, 0.5, 0)])
         with self.assertRaises(ValueError):
             self.viewer.set_color_ramp("density", [(0, 0, 0), (1, 1, 1)])
+        for stops in (None, 3, [0, 0, 0, 0]):
+            with self.assertRaisesRegex(TypeError, "^stops: groups of 4 numbers are needed, not "):
+                self.viewer.set_color_ramp("density", stops)
         with self.assertRaises(cumulet.Error):
             self.viewer.set_color_ramp("density", [(0, 0, 0, 0), (1, 2, 0, 0)])
         brighter = self.viewer.render_picture(SIZE, progress=False)
@@ -176,8 +179,13 @@ class Pictures(unittest.TestCase):
         self.viewer.set_clip(planes=[(0, 1, 0, -0.5), (1, 0, 0, 2)])
         with self.assertRaises(TypeError):
             self.viewer.set_clip(planes=[("x", 1, 0, -0.5)])
+        with self.assertRaisesRegex(cumulet.Error, "box is empty"):  # a box alone is not ignored
+            self.viewer.set_clip(box_min=(0, 0, 0), box_max=(0, 1, 1))
+        self.viewer.set_clip(box=False, box_min=(0, 0, 0), box_max=(0, 1, 1))
         with self.assertRaises(cumulet.Error):
             self.viewer.set_clip(planes=[0, 0, 0, 1])
+        with self.assertRaisesRegex(cumulet.Error, "plane 0 has no direction"):
+            cumulet.Instance().set_clip(planes=[0, 0, 0, 1])
         with self.assertRaises(ValueError):
             self.viewer.set_clip(planes=[0, 1, 0])
         self.viewer.set_clip()

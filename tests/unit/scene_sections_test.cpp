@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <filesystem>
 #include <settings.hpp>
 #include <stdexcept>
 #include <string>
 
+#include "support/folder.hpp"
 #include "support/scene_texts.hpp"
 
 namespace {
@@ -17,6 +19,33 @@ using namespace cumulet::demo;
 using cumulet::test::error_of;
 using cumulet::test::section_error;
 using cumulet::test::with;
+
+// Linux has file names of any bytes, and JSON has none that are not UTF-8.
+TEST(SceneFile, ANameThatIsNotUtf8IsNotSavedAsAnother) {
+  const cumulet::test::Folder folder;
+  SceneOptions scene;
+  scene.volume = (folder / "cloud.vdb").string();
+  const std::string path = (folder / "scene.json").string();
+  save_scene(scene, path);
+  using Name = std::string SceneOptions::*;
+  for (const Name file : {Name{&SceneOptions::volume}, Name{&SceneOptions::environment}}) {
+    SceneOptions other;
+    other.*file = (folder / "wolke\xe9.vdb").string();
+    try {
+      save_scene(other, path);
+      ADD_FAILURE();
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(error.what(), path + ": cannot name wolke\xe9.vdb, because that is not UTF-8");
+    }
+    EXPECT_TRUE(same_scene(load_scene(path), scene)) << "the old file remains";
+  }
+  // A name that is relative to the scene file lacks the folder.
+  std::filesystem::create_directory(folder / "h\xe9");
+  scene.volume = (folder / "h\xe9/cloud.vdb").string();
+  const std::string beside = (folder / "h\xe9/scene.json").string();
+  save_scene(scene, beside);
+  EXPECT_EQ(load_scene(beside).volume, scene.volume);
+}
 
 TEST(SceneFile, TransformIsAMatrixOrTranslationRotationScale) {
   const SceneOptions parts = parse_scene(

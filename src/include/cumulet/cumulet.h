@@ -153,9 +153,9 @@
  *
  * @section cumulet_errors Errors
  *
- * - Every function that can fail returns a cumulet_status. After a call with a viewer, cumulet_last_error returns, on
- *   the same thread, one line that names the cause, and the file if there is one. Functions without a viewer write
- *   that line into the caller's error buffer, if they have one.
+ * - Every function that can fail returns a cumulet_status. cumulet_last_error then returns, on the same thread, one
+ *   line that names the cause, and the file if there is one. After a function without a viewer it takes NULL. Such
+ *   functions also write the line into the caller's error buffer, if they have one.
  * - A call that fails leaves the viewer as it was, and the viewer still draws what it drew before. No C++ exception
  *   leaves the library.
  * - Every function returns CUMULET_ERROR_INVALID_ARGUMENT for a NULL handle, a NULL pointer that is not documented as
@@ -456,9 +456,9 @@ CUMULET_API void cumulet_destroy(cumulet_viewer* viewer);
  *
  * Threads: any thread. No GL.
  *
- * @param viewer The viewer; NULL gives "viewer is NULL".
+ * @param viewer The viewer. NULL: for the last call of this thread without a viewer, for example with an instance.
  * @return The line; "" if that call succeeded, or if there was none. Valid until the next call of this thread for this
- *         viewer.
+ *         viewer, or without one. It is "viewer is NULL" with NULL, after a call that needs a viewer and got NULL.
  */
 CUMULET_API const char* cumulet_last_error(const cumulet_viewer* viewer);
 

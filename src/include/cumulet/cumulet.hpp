@@ -239,9 +239,11 @@ namespace detail {
   if (status == CUMULET_OK) return {};
   return Error{static_cast<StatusCode>(status), Text<512>(cause)};
 }
-/// For functions that return only a status.
+/// For functions without a viewer that return only a status.
 [[nodiscard]] inline Result<> result(cumulet_status status) noexcept {
-  return result(status, cumulet_status_text(status));
+  if (status == CUMULET_OK) return {};
+  const char* const cause = cumulet_last_error(nullptr);
+  return result(status, *cause != '\0' ? cause : cumulet_status_text(status));
 }
 
 /// For functions that create a handle and write the cause to a buffer: make(&out, error, error_size).
