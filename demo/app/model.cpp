@@ -265,6 +265,11 @@ std::string scene_name(const Model& model) {
 
 std::string suggest_path(const Model& model, const std::string& ending) {
   std::string stem = fs::path(main_file(model.scene)).stem().string();
+  // A name with the mark of a frame number would be that of a sequence.
+  if (const std::size_t mark = stem.find('#'); mark != std::string::npos) {
+    stem.erase(mark);
+    stem.erase(stem.find_last_not_of("_-. ") + 1);
+  }
   if (stem.empty()) stem = "cumulet";
   const fs::path folder(model.preferences.folder);
   constexpr int most = 1000;

@@ -8,7 +8,10 @@ import time
 
 from demo_session import SIZE, shot
 
-SAVE_AS = ["frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3"]
+def save_as(s):
+    """Types a name into the open dialog."""
+    return ["frames 2", "key ctrl+a", f'text "{s.out}/scene.json"', "key enter", "frames 3"]
+
 
 
 def scene(name, cumulus):
@@ -27,7 +30,7 @@ def test_unsaved(s):
             "close", "frames 2", *shot("asked"), 'click "Question/Cancel"', "frames 3", *shot("stayed"),
             # A dialog that is closed without saving keeps the window open.
             "close", "frames 2", "key enter", "frames 3", *shot("dialog"), "key escape", "frames 3", *shot("not_saved"),
-            "key ctrl+s", *SAVE_AS, *shot("saved"),
+            "key ctrl+s", *save_as(s), *shot("saved"),
             "key ]", "frames 3", f'drop "{s.out}/other.json"', "frames 2", *shot("opening"), "key escape", "frames 3", *shot("kept"),
             f'drop "{s.out}/other.json"', "frames 2", 'click "Question/Discard"', *there, *shot("opened"),
             "key ]", "frames 3", "key ctrl+n", "frames 2", 'click "Question/Discard"', *there, *shot("new"),
