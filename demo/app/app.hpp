@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "demo_options.hpp"
+#include "end_signals.hpp"
 #include "exchange.hpp"
 #include "history.hpp"
 #include "image_input.hpp"
@@ -95,6 +96,8 @@ class App {
   void offer_recovery();
   void recover();
   void autosave();
+  /// Removes the recovery file, or, if a signal ends the program, completes it for the next start.
+  void keep_or_remove_recovery();
   void step_history(bool back);
   void cancel();
 
@@ -188,7 +191,10 @@ class App {
   Frames frames_;
   float ui_scale_ = 0.0f;
   bool held_ = false;  // the user is still making a change
-  bool quit_ = false;
+  struct Ending {
+    bool quit = false;
+    EndSignals signals{Window::wake};
+  } ending_;
   bool camera_moved_ = false;
   double now_ = 0.0;
   double last_event_ = 0.0;

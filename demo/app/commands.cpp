@@ -265,7 +265,7 @@ struct App::Commands {
        }},
       {Action::quit_anyway,
        [](App& app, const Command& command) {
-         if (!app.ask_about_changes({command})) app.quit_ = true;
+         if (!app.ask_about_changes({command})) app.ending_.quit = true;
        }},
       {Action::follow_light, [](App& app, const Command&) { app.meter_when_loaded(); }},
       {Action::daylight,

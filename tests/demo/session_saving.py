@@ -74,6 +74,32 @@ def killed(s, name, *arguments):
     return copy
 
 
+def test_ended(s):
+    """A signal, such as that of the desktop's logout, ends the program without a loss: the recent files and the unsaved
+    changes are kept, and no unfinished file."""
+    (s.out / "ended.replay").write_text("\n".join(["frames 3", "wait loaded", "frames 3", "key ]", "frames 9", 'report "live.json"', "idle 60"]))
+    demo = subprocess.Popen([s.demo, *SIZE, "--spp", "1", s.cumulus, "--replay", "ended.replay"], cwd=s.out, env=s.environment)
+    try:
+        while not (s.out / "live.json").exists():
+            assert demo.poll() is None
+            time.sleep(0.05)
+        config = s.out / "config/cumulet/demo.json"
+        assert json.loads(config.read_text())["recent"] == [s.cumulus], "a crash keeps the recent files"
+        config.unlink()
+        began = time.monotonic()
+        demo.send_signal(signal.SIGTERM)
+        assert demo.wait(timeout=120) == 0
+        assert time.monotonic() - began < 30, "it does not wait for the end of the replay"
+    finally:
+        demo.kill()
+    assert json.loads(config.read_text())["recent"] == [s.cumulus]
+    copy = s.out / "state/cumulet/recovery-1.json"
+    assert json.loads(copy.read_text())["display"]["exposure_stops"] > 0.3
+    s.play("next", ["frames 3", *shot("asked"), 'click "Question/Recover"', "frames 3", "wait loaded", "frames 3", *shot("recovered")])
+    assert s.report("asked")["question"] == "Recover unsaved changes"
+    assert s.report("recovered")["modified"]
+
+
 def test_recovery(s):
     """After a crash the next start offers the unsaved changes."""
     config = s.out / "config/cumulet/demo.json"
