@@ -485,7 +485,7 @@ void App::follow_recent() {
     recent_.thumbnails.stop();
     return;
   }
-  recent_.thumbnails.follow(listed_files(model_.preferences));
+  if (!recent_.thumbnails.follow(listed_files(model_.preferences), now_)) return;
   model_.recent_textures.clear();
   for (const std::string& file : listed_files(model_.preferences)) {
     const std::string picture = recent_.thumbnails.find(file);
