@@ -155,6 +155,18 @@ double device_seconds(const cumulet_stats& stats) {
          stats.pass_seconds_trace + stats.pass_seconds_inspect + stats.pass_seconds_display;
 }
 
+Fields fields_of(const cumulet_volume& volume) {
+  Fields fields;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    cumulet_histogram_info values{};
+    values.struct_size = sizeof values;
+    if (cumulet_volume_get_histogram(&volume, static_cast<cumulet_ramp>(i), &values) == CUMULET_OK &&
+        values.max_value > 0.0f)
+      fields[i] = {values.max_value, heights(values.histogram)};
+  }
+  return fields;
+}
+
 Model::Model() {
   navigation.struct_size = sizeof navigation;
   navigation.speed = 1.0;

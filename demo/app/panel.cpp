@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
-#include <presets.hpp>
 #include <settings.hpp>
 #include <string>
 #include <utility>
@@ -257,58 +256,6 @@ void Panel::variant(Model& model) {
   // If names are empty or ambiguous, the variant is stored by number.
   if (chosen > 0 && std::ranges::find(names, wanted) - names.begin() != chosen - 1) wanted = std::to_string(index);
   if (chosen > 0 && wanted.empty()) wanted = std::to_string(index);
-}
-
-namespace {
-
-/// Returns true if the setting has an effect: the phase function has it, and the volume has the grid that it scales.
-/// flame_colors: a color ramp replaces the color of flames.
-template <class Setting>
-bool acts(const Setting& setting, const cumulet_medium_desc& medium, const Status& status, bool flame_colors) {
-  using Desc = cumulet_medium_desc;
-  if (setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight))
-    return medium.phase == CUMULET_PHASE_TWO_LOBE;
-  if (setting.is(&Desc::droplet_diameter)) return medium.phase == CUMULET_PHASE_MIE;
-  if (setting.is(&Desc::anisotropy)) return medium.phase != CUMULET_PHASE_MIE;
-  const auto has = [&](cumulet_ramp grid) { return status.fields[static_cast<std::size_t>(grid)].most > 0.0f; };
-  if (setting.is(&Desc::flame_color) && flame_colors) return false;
-  if (setting.is(&Desc::flame_strength) || setting.is(&Desc::flame_color)) return has(CUMULET_RAMP_FLAME);
-  const bool of_heat = setting.is(&Desc::temperature_scale) || setting.is(&Desc::temperature_offset) ||
-                       setting.is(&Desc::blackbody) || setting.is(&Desc::blackbody_tint);
-  return !of_heat || has(CUMULET_RAMP_TEMPERATURE);
-}
-
-}  // namespace
-
-void Panel::medium(Model& model, std::vector<Command>& commands) {
-  using Desc = cumulet_medium_desc;
-  Desc& medium = model.scene.medium;
-  std::vector<Choice> presets;
-  presets.reserve(preset_choices.size());
-  for (const settings::Choice& preset : preset_choices) presets.push_back({preset.label, preset.value, preset.tip});
-  const std::optional<Preset> now = preset_of(medium);
-  int chosen = now ? static_cast<int>(*now) : -1;
-  if (ui_.choose("Preset", "Preset of the medium; does not change the density scale and the ramps.", presets, chosen))
-    apply(static_cast<Preset>(chosen), medium);
-  settings::for_each<Desc>([&](const auto& setting) {
-    if (!acts(setting, medium, model.status, !model.scene.color_ramps[CUMULET_RAMP_FLAME].empty())) return;
-    rows_.draw(setting, medium.*setting.field);
-    if (setting.is(&Desc::density_scale) && model.status.has_volume &&
-        ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f}))
-      commands.push_back({Action::auto_density});
-    if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
-  });
-  ramps(model);
-}
-
-/// Draws a slider for the absorption. A cloud's absorption is far below the resolution of a color field.
-void Panel::absorption(float (&coalbedo)[3]) {
-  float mean = (coalbedo[0] + coalbedo[1] + coalbedo[2]) / 3.0f;
-  const float before = mean;
-  if (!ui_.slider("Absorption", "Mean fraction of light that is absorbed: 1 - albedo.", mean, 0.0f, 1.0f, "%.4g",
-                  ImGuiSliderFlags_Logarithmic))
-    return;
-  for (float& one : coalbedo) one = before > 0.0f ? std::min(one * mean / before, 1.0f) : mean;
 }
 
 void Panel::grid(Model& model) {
