@@ -361,6 +361,7 @@ void App::accept(const Answer& answer) {
     const bool clear = std::ranges::any_of(grids, [](const GridInfo& grid) { return grid.name == "density"; });
     if (shown > 1 && !clear && !burns()) panel_.picker().open(model_.scene.volume, Window::wake);
   }
+  if (!exchange_.waiting()) place_added();
   if (!exchange_.waiting()) loading_.starting = false;
   if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }

@@ -71,6 +71,10 @@ class App {
   void follow_recent();
   void make_sample_cards();
   void open_dropped(const std::vector<std::string>& files);
+  /// Selects an object that the user has added. It is placed in the scene when its size is known.
+  void take_added(const Item& item);
+  /// Gives added objects that are tiny, huge or far a size and a place that suit the scene.
+  void place_added();
   /// Says that a volume stands on its Z axis, with a button for the Y axis. further: the file of a further volume, ""
   /// for the first one.
   void show_up_axis(const std::string& path, const std::string& further);
@@ -142,6 +146,7 @@ class App {
     bool meter = false;       // measure the exposure when everything is loaded
     bool pick = false;        // the volume being loaded was opened without a grid name
     bool starting = true;     // until the files of the command line are loaded or have failed
+    std::vector<Item> added;  // objects that were added and are not placed yet
     std::string scene;        // scene file
     std::string environment;  // environment map
   };

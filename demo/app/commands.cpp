@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <default_look.hpp>
 #include <exception>
+#include <filesystem>
+#include <glm/glm.hpp>
 #include <info.hpp>
 #include <string>
 #include <utility>
@@ -68,11 +70,15 @@ struct App::Commands {
          added.up = known_up_axis(command.text);
          spell_out_defaults(app.model_.scene);
          if (added.up == UpAxis::z) app.show_up_axis(command.text, command.text);
+         app.take_added({Item::Kind::volume, app.model_.scene.others.size(), 0});
        }},
       {Action::add_model_dialog,
        [](App& app, const Command&) { app.open_dialog("Add model", Action::add_model, {".gltf", ".glb"}); }},
       {Action::add_model,
-       [](App& app, const Command& command) { app.model_.scene.models.push_back({command.text}); }},
+       [](App& app, const Command& command) {
+         app.model_.scene.models.push_back({command.text});
+         app.take_added({Item::Kind::model, app.model_.scene.models.size() - 1, 0});
+       }},
       {Action::environment_dialog,
        [](App& app, const Command&) { app.open_dialog("Open environment map", Action::open, {".hdr", ".exr"}); }},
       {Action::clear_environment,
@@ -272,13 +278,19 @@ struct App::Commands {
        [](App& app, const Command&) {
          if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_when_loaded();
        }},
+      {Action::keep_place,
+       [](App& app, const Command& command) {
+         const Item item{command.text == "model" ? Item::Kind::model : Item::Kind::volume,
+                         static_cast<std::size_t>(command.value), 0};
+         if (transform_of(app.model_.scene, item)) set_transform(app.model_.scene, item, glm::dmat4(1.0));
+       }},
   });
 
   /// Returns true if each action has a function, at its index.
   static constexpr bool is_complete() {
     for (std::size_t i = 0; i < table.size(); ++i)
       if (table[i].action != static_cast<Action>(i)) return false;
-    return table.size() == static_cast<std::size_t>(Action::daylight) + 1;
+    return table.size() == static_cast<std::size_t>(Action::keep_place) + 1;
   }
 };
 
@@ -436,6 +448,7 @@ void App::step_history(bool back) {
   if (!scene) return;
   const cumulet_camera_desc camera = model_.scene.camera;
   model_.scene = *scene;
+  loading_.added.clear();
   loading_.fit = loading_.suggest = false;
   if (model_.navigation.turntable_degrees_per_second != 0.0) model_.scene.camera = camera;
 }

@@ -100,7 +100,8 @@ enum class Action {
   quit,          // asks about unsaved changes and unfinished pictures
   quit_anyway,   // asks only about unsaved changes
   follow_light,  // measures the exposure again, because the sun has moved
-  daylight       // sets the default daylight and display instead of the dusk of a burning volume
+  daylight,      // sets the default daylight and display instead of the dusk of a burning volume
+  keep_place     // text: "volume" or "model", value: its index; removes the transform that the program gave it
 };
 
 struct Command {

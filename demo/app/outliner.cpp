@@ -119,7 +119,7 @@ void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Comm
     for (const Item& one : items)
       if (one.kind == kind) item(model, one, commands);
   };
-  group("Lights", "Add light", "Adds a point light above the camera's target.", Action::add_light, commands);
+  group("Lights", "Add light", "Adds a point light in view, above the camera's target.", Action::add_light, commands);
   all(Item::Kind::analytic_light);
   group("Volumes", "Add volume", "Adds another volume.", Action::add_volume_dialog, commands);
   all(Item::Kind::volume);
