@@ -431,7 +431,7 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
   ImGui::SetNextWindowBgAlpha(0.88f);
   ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
   const float button = ui_.px(76.0f);
-  const std::string name = file_name(model.status.loading.empty() ? model.scene.volume : model.status.loading);
+  const std::string name = file_name(file_of_work(model));
   ImGui::TextUnformatted(work.name);
   if (!name.empty()) {
     ImGui::SameLine();
