@@ -180,6 +180,12 @@ struct App::Commands {
        [](App& app, const Command& command) {
          app.image_->release_handle();
          app.model_.tool = static_cast<Tool>(command.value);
+         // The object in the inspector gets the handles, also if it was not selected by hand.
+         const Subject subject = subject_of(app.model_);
+         const Item* const item = std::get_if<Item>(&subject);
+         if (app.model_.tool != Tool::none && !app.model_.chosen && item != nullptr &&
+             transform_of(app.model_.scene, *item))
+           app.model_.chosen = *item;
        }},
       {Action::toggle_axes,
        [](App& app, const Command&) {
@@ -246,7 +252,12 @@ struct App::Commands {
          if (app.model_.status.play) app.model_.scene.sequence.frame = app.model_.status.play->frame();
        }},
       {Action::auto_density, [](App& app, const Command&) { app.request({Request::Type::suggest_density}); }},
-      {Action::play_row, [](App& app, const Command&) { app.clock_.play_row(); }},
+      {Action::play_row,
+       [](App& app, const Command&) {
+         app.clock_.play_row();
+         app.loading_.reload = true;
+         app.clock_.play_when_loaded(true);
+       }},
       {Action::play, [](App& app, const Command&) { app.clock_.play_or_pause(); }},
       {Action::step, [](App& app, const Command& command) { app.clock_.step(command.value); }},
       {Action::go_to,
@@ -380,7 +391,8 @@ void App::follow_samples() {
 }
 
 void App::show_up_axis(const std::string& path, const std::string& further) {
-  show_message(model_, false, path + ": Z is up, as its metadata says", now_,
+  const std::string name = std::filesystem::path(path).filename().string();
+  show_message(model_, false, name + ": Z is up, as its metadata says", now_,
                MessageButton{"Y up",
                              "Stands the volume on its Y axis, as in its file. Ctrl+Z undoes that.",
                              {Action::choose_up, further, static_cast<int>(UpAxis::y)}});

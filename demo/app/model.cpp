@@ -37,9 +37,9 @@ const std::vector<Shortcut>& shortcuts() {
   constexpr unsigned shift = modifier_shift;
   static const std::vector<Shortcut> all = {
       {GLFW_KEY_N, ctrl, {Action::new_scene}, "Ctrl+N", "New scene"},
-      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
+      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, a model, an environment map or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
-      {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
+      {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene under another name"},
       {GLFW_KEY_F12, 0, {Action::render_dialog}, "F12", "Render a picture or a sequence in the background"},
       {GLFW_KEY_F12, ctrl, {Action::png_dialog}, "Ctrl+F12", "Save the displayed image as PNG"},
       {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the displayed image as linear OpenEXR"},

@@ -36,6 +36,12 @@ std::string print(const char* format, Values... values) {
   return text.data();
 }
 
+/// Returns a format that prints an hour as a clock does: "14:12 (14.20 h)". The number is what the user can type.
+std::string clock_text(double hour) {
+  const auto minutes = static_cast<int>(std::lround(hour * 60.0));
+  return print("%d:%02d", minutes / 60, minutes % 60) + "  (%.2f h)";
+}
+
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 }  // namespace
@@ -92,7 +98,8 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
   ImGui::Begin(panel_name, nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing);
+                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
+                   ImGuiWindowFlags_NoScrollWithMouse);
   ImGui::PopStyleVar();
   edge(model);
   // The inspector keeps at least three fifths of the height.
@@ -192,7 +199,7 @@ bool Panel::time_of_day(cumulet_sun_sky_desc& light) {
           "Time of day",
           "Moves the sun along its path over a day at the equinox: it rises at 6 and sets at 18 hours. The dial "
           "turns the path.",
-          hour, SunPath::first_hour, SunPath::last_hour, "%.2f h"))
+          hour, SunPath::first_hour, SunPath::last_hour, clock_text(hour).c_str()))
     return false;
   const SunAngles moved = sun_path_->at(hour);
   light.sun_azimuth_degrees = static_cast<float>(moved.azimuth);
@@ -476,7 +483,7 @@ void Panel::state_line(const Model& model) {
 void Panel::help(Model& model) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
-  ImGui::SetNextWindowBgAlpha(0.97f);
+  ImGui::SetNextWindowBgAlpha(1.0f);
   ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, screen);
   if (help_was_closed_) ImGui::SetNextWindowFocus();
   ImGui::Begin("Keys and mouse", &model.help,
