@@ -88,7 +88,7 @@ App::App(DemoOptions options)
 App::~App() = default;
 
 void App::run() {
-  while (!quit_) {
+  while (!ending_.quit && !ending_.signals.received()) {
     Window::wait(patience());
     // Limits the frame rate: the remaining time is for rendering.
     const double early = now_ + min_frame - glfwGetTime();
@@ -99,7 +99,7 @@ void App::run() {
     frame();
   }
   remember();
-  changes_->recovery().remove();
+  keep_or_remove_recovery();
   if (!options_.trace.empty()) image::replace_file(options_.trace, timeline_.json());
 }
 
@@ -361,6 +361,7 @@ void App::accept(const Answer& answer) {
     const bool clear = std::ranges::any_of(grids, [](const GridInfo& grid) { return grid.name == "density"; });
     if (shown > 1 && !clear && !burns()) panel_.picker().open(model_.scene.volume, Window::wake);
   }
+  if (!exchange_.waiting()) place_added();
   if (!exchange_.waiting()) loading_.starting = false;
   if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }
@@ -406,6 +407,7 @@ void App::remember_files(const Answer& answer) {
     switch (file.fate) {
       case Answer::File::Fate::opened:
         preferences.remember(file.path);
+        remember();  // a program that is killed keeps its recent files
         break;
       case Answer::File::Fate::failed:
         preferences.forget(file.path);
@@ -484,7 +486,7 @@ void App::follow_recent() {
     recent_.thumbnails.stop();
     return;
   }
-  recent_.thumbnails.follow(listed_files(model_.preferences));
+  if (!recent_.thumbnails.follow(listed_files(model_.preferences), now_)) return;
   model_.recent_textures.clear();
   for (const std::string& file : listed_files(model_.preferences)) {
     const std::string picture = recent_.thumbnails.find(file);
@@ -507,7 +509,7 @@ void App::follow_recent() {
 void App::obey(const Player::Order& order) {
   if (!order.screenshot.empty()) save_window(order.screenshot);
   if (!order.report.empty()) write_report(order.report);
-  if (order.quit) quit_ = true;
+  if (order.quit) ending_.quit = true;
 }
 
 void App::remember() {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "demo_options.hpp"
+#include "end_signals.hpp"
 #include "exchange.hpp"
 #include "history.hpp"
 #include "image_input.hpp"
@@ -70,6 +71,10 @@ class App {
   void follow_recent();
   void make_sample_cards();
   void open_dropped(const std::vector<std::string>& files);
+  /// Selects an object that the user has added. It is placed in the scene when its size is known.
+  void take_added(const Item& item);
+  /// Gives added objects that are tiny, huge or far a size and a place that suit the scene.
+  void place_added();
   /// Says that a volume stands on its Z axis, with a button for the Y axis. further: the file of a further volume, ""
   /// for the first one.
   void show_up_axis(const std::string& path, const std::string& further);
@@ -95,6 +100,8 @@ class App {
   void offer_recovery();
   void recover();
   void autosave();
+  /// Removes the recovery file, or, if a signal ends the program, completes it for the next start.
+  void keep_or_remove_recovery();
   void step_history(bool back);
   void cancel();
 
@@ -140,6 +147,7 @@ class App {
     bool pick = false;        // the volume being loaded was opened without a grid name
     bool starting = true;     // until the files of the command line are loaded or have failed
     bool discards = false;    // the user continues without the unsaved changes
+    std::vector<Item> added;  // objects that were added and are not placed yet
     std::string scene;        // scene file
     std::string environment;  // environment map
   };
@@ -189,7 +197,10 @@ class App {
   Frames frames_;
   float ui_scale_ = 0.0f;
   bool held_ = false;  // the user is still making a change
-  bool quit_ = false;
+  struct Ending {
+    bool quit = false;
+    EndSignals signals{Window::wake};
+  } ending_;
   bool camera_moved_ = false;
   double now_ = 0.0;
   double last_event_ = 0.0;

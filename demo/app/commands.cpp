@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <default_look.hpp>
 #include <exception>
+#include <filesystem>
+#include <glm/glm.hpp>
 #include <info.hpp>
 #include <string>
 #include <utility>
@@ -68,11 +70,15 @@ struct App::Commands {
          added.up = known_up_axis(command.text);
          spell_out_defaults(app.model_.scene);
          if (added.up == UpAxis::z) app.show_up_axis(command.text, command.text);
+         app.take_added({Item::Kind::volume, app.model_.scene.others.size(), 0});
        }},
       {Action::add_model_dialog,
        [](App& app, const Command&) { app.open_dialog("Add model", Action::add_model, {".gltf", ".glb"}); }},
       {Action::add_model,
-       [](App& app, const Command& command) { app.model_.scene.models.push_back({command.text}); }},
+       [](App& app, const Command& command) {
+         app.model_.scene.models.push_back({command.text});
+         app.take_added({Item::Kind::model, app.model_.scene.models.size() - 1, 0});
+       }},
       {Action::environment_dialog,
        [](App& app, const Command&) { app.open_dialog("Open environment map", Action::open, {".hdr", ".exr"}); }},
       {Action::clear_environment,
@@ -174,6 +180,12 @@ struct App::Commands {
        [](App& app, const Command& command) {
          app.image_->release_handle();
          app.model_.tool = static_cast<Tool>(command.value);
+         // The object in the inspector gets the handles, also if it was not selected by hand.
+         const Subject subject = subject_of(app.model_);
+         const Item* const item = std::get_if<Item>(&subject);
+         if (app.model_.tool != Tool::none && !app.model_.chosen && item != nullptr &&
+             transform_of(app.model_.scene, *item))
+           app.model_.chosen = *item;
        }},
       {Action::toggle_axes,
        [](App& app, const Command&) {
@@ -240,7 +252,12 @@ struct App::Commands {
          if (app.model_.status.play) app.model_.scene.sequence.frame = app.model_.status.play->frame();
        }},
       {Action::auto_density, [](App& app, const Command&) { app.request({Request::Type::suggest_density}); }},
-      {Action::play_row, [](App& app, const Command&) { app.clock_.play_row(); }},
+      {Action::play_row,
+       [](App& app, const Command&) {
+         app.clock_.play_row();
+         app.loading_.reload = true;
+         app.clock_.play_when_loaded(true);
+       }},
       {Action::play, [](App& app, const Command&) { app.clock_.play_or_pause(); }},
       {Action::step, [](App& app, const Command& command) { app.clock_.step(command.value); }},
       {Action::go_to,
@@ -265,12 +282,18 @@ struct App::Commands {
        }},
       {Action::quit_anyway,
        [](App& app, const Command& command) {
-         if (!app.ask_about_changes({command})) app.quit_ = true;
+         if (!app.ask_about_changes({command})) app.ending_.quit = true;
        }},
       {Action::follow_light, [](App& app, const Command&) { app.meter_when_loaded(); }},
       {Action::daylight,
        [](App& app, const Command&) {
          if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_when_loaded();
+       }},
+      {Action::keep_place,
+       [](App& app, const Command& command) {
+         const Item item{command.text == "model" ? Item::Kind::model : Item::Kind::volume,
+                         static_cast<std::size_t>(command.value), 0};
+         if (transform_of(app.model_.scene, item)) set_transform(app.model_.scene, item, glm::dmat4(1.0));
        }},
   });
 
@@ -278,7 +301,7 @@ struct App::Commands {
   static constexpr bool is_complete() {
     for (std::size_t i = 0; i < table.size(); ++i)
       if (table[i].action != static_cast<Action>(i)) return false;
-    return table.size() == static_cast<std::size_t>(Action::daylight) + 1;
+    return table.size() == static_cast<std::size_t>(Action::keep_place) + 1;
   }
 };
 
@@ -368,7 +391,8 @@ void App::follow_samples() {
 }
 
 void App::show_up_axis(const std::string& path, const std::string& further) {
-  show_message(model_, false, path + ": Z is up, as its metadata says", now_,
+  const std::string name = std::filesystem::path(path).filename().string();
+  show_message(model_, false, name + ": Z is up, as its metadata says", now_,
                MessageButton{"Y up",
                              "Stands the volume on its Y axis, as in its file. Ctrl+Z undoes that.",
                              {Action::choose_up, further, static_cast<int>(UpAxis::y)}});
@@ -436,6 +460,7 @@ void App::step_history(bool back) {
   if (!scene) return;
   const cumulet_camera_desc camera = model_.scene.camera;
   model_.scene = *scene;
+  loading_.added.clear();
   loading_.fit = loading_.suggest = false;
   if (model_.navigation.turntable_degrees_per_second != 0.0) model_.scene.camera = camera;
 }

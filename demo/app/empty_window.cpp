@@ -3,10 +3,10 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,7 +15,6 @@ namespace cumulet::demo {
 namespace {
 
 constexpr float wanted_width = 560.0f;
-constexpr float title_scale = 2.4f;
 
 void draw_gradient(const Rectangle& view) {
   const ImVec2 low(static_cast<float>(view.x), static_cast<float>(view.y));
@@ -25,11 +24,31 @@ void draw_gradient(const Rectangle& view) {
   ImGui::GetBackgroundDrawList()->AddRectFilledMultiColor(low, high, above, above, below, below);
 }
 
+/// Draws text in lines that are as long as the window is wide, each centered.
 void draw_centered(const char* text) {
   const float room = ImGui::GetContentRegionAvail().x;
-  const float length = ImGui::CalcTextSize(text, nullptr, false, room).x;
-  ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(0.0f, 0.5f * (room - length)));
-  ImGui::TextUnformatted(text);
+  const char* const end = text + std::strlen(text);
+  while (text < end) {
+    const ImFont& font = *ImGui::GetFont();
+    const char* stop = font.CalcWordWrapPositionA(ImGui::GetFontSize() / font.FontSize, text, end, room);
+    if (stop == text) ++stop;  // a character that is wider than the window
+    const float length = ImGui::CalcTextSize(text, stop).x;
+    ImGui::SetCursorPosX(ImGui::GetCursorPosX() + std::max(0.0f, 0.5f * (room - length)));
+    ImGui::TextUnformatted(text, stop);
+    for (text = stop; text < end && *text == ' ';) ++text;
+  }
+}
+
+/// Draws the program's name, in a size that fits the window.
+void draw_title() {
+  ImFont* const font = title_font();
+  ImGui::PushFont(font);
+  const float room = ImGui::GetContentRegionAvail().x;
+  const float length = ImGui::CalcTextSize("Cumulet").x;
+  ImGui::SetWindowFontScale(std::min(1.0f, 0.98f * room / length));
+  draw_centered("Cumulet");
+  ImGui::SetWindowFontScale(1.0f);
+  ImGui::PopFont();
 }
 
 /// Returns the OpenGL texture as ImGui's.
@@ -131,19 +150,15 @@ void draw_empty_window(Ui& ui, const Rectangle& view, const Model& model, std::v
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav | ImGuiWindowFlags_AlwaysAutoResize);
-  ImGui::PushTextWrapPos();
-  ImGui::SetWindowFontScale(title_scale);
-  draw_centered("Cumulet");
-  ImGui::SetWindowFontScale(1.0f);
+  draw_title();
   ImGui::Spacing();
   if (ImGui::Button("Open...", {-1.0f, 0.0f})) commands.push_back({Action::open_dialog});
-  ui.remember("Start/Open", "Opens a volume, a model, an environment map or a scene (Ctrl+O).");
+  ui.remember("Start/Open",
+              "Opens a volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif), a model (.gltf, .glb), an environment map "
+              "(.hdr, .exr) or a scene (.json): Ctrl+O.");
   ImGui::Spacing();
-  constexpr std::array lines{"Drop a volume (.vdb, .nvdb, .nrrd, .nhdr, .vti, .raw, .tif),",
-                             "surfaces (.gltf, .glb), an environment (.hdr, .exr) or a scene (.json) here,",
-                             "or press Ctrl+O.  F1 shows all keys."};
-  for (const char* line : lines) draw_centered(line);
-  ImGui::PopTextWrapPos();
+  draw_centered("Or drop a volume, a model, an environment map or a scene here.");
+  draw_centered("F1 shows all keys.");
   ImGui::Spacing();
   draw_samples(ui, model, commands);
   draw_recent(ui, model, commands);

@@ -33,7 +33,8 @@ void FileDialog::open(const std::string& title, Action done, std::vector<std::st
   fs::path folder = saving() ? start.parent_path() : start;
   if (folder.empty() || !fs::is_directory(folder, error)) folder = fs::current_path(error);
   enter(folder.string());
-  path_ = saving() ? (folder / start.filename()).string() : "";
+  name_ = start.filename().string();
+  path_ = saving() ? (folder / name_).string() : "";
   if (desktop_ && !desktop_->open({saving(), title_, parent_, folder_, start.filename().string(), endings_}))
     desktop_.reset();
 }
@@ -59,9 +60,11 @@ bool FileDialog::takes(const std::string& file) const {
 void FileDialog::choose(std::vector<Command>& commands) {
   if (path_.empty()) return;
   std::error_code error;
+  // A name that was typed belongs to the folder that is shown.
+  path_ = (fs::path(folder_) / path_).lexically_normal().string();
   if (fs::is_directory(path_, error)) {
     enter(path_);
-    if (!saving()) path_.clear();
+    path_ = saving() ? (fs::path(folder_) / name_).string() : "";
     return;
   }
   if (saving()) {
@@ -262,10 +265,13 @@ void FileDialog::draw_own(Ui& ui, const Preferences& preferences, std::vector<Co
   list(ui, commands);
   draw_trouble(endings);
   ImGui::Spacing();
-  if (ui.button(saving() ? "Save file" : "Open file", "Uses the path above.", {ui.px(110.0f), 0.0f})) choose(commands);
+  ImGui::BeginDisabled(path_.empty());
+  const bool chosen = ui.button(saving() ? "Save file" : "Open file", "Uses the path above.", {ui.px(110.0f), 0.0f});
+  ImGui::EndDisabled();
+  if (chosen) choose(commands);
   ImGui::SameLine();
   const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) && !ImGui::IsAnyItemActive();
-  if (ui.button("Close", "Closes the dialog (Escape).", {ui.px(110.0f), 0.0f}) || escape) close();
+  if (ui.button("Cancel##dialog", "Closes the dialog (Escape).", {ui.px(110.0f), 0.0f}) || escape) close();
 }
 
 }  // namespace cumulet::demo

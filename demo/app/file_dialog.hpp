@@ -54,6 +54,7 @@ class FileDialog {
   Action done_ = Action::open;
   std::vector<std::string> endings_;
   std::string folder_;
+  std::string name_;  // suggested for a new file
   std::string path_;
   std::string search_;
   std::string trouble_;

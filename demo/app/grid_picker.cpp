@@ -13,7 +13,7 @@
 namespace cumulet::demo {
 namespace {
 
-constexpr const char* popup = "Choose a grid###grids";
+constexpr const char* popup = "Grids of the file###grids";
 
 struct ReleaseInspection {
   void operator()(cumulet_inspection* inspection) const { cumulet_inspection_release(inspection); }

@@ -71,17 +71,20 @@ void Panel::volume(Model& model, const Item& item, std::vector<Command>& command
   };
   SceneVolume& shown = volume_at(model.scene, item.index);
   const bool first = item.index == 0;
-  tab("Material", "How the medium scatters, absorbs and emits light.", [&] {
-    if (first)
-      medium(model, commands);
-    else
-      other_medium(shown);
-  });
+  tab("Material", "How the medium scatters, absorbs and emits light.", [&] { medium(model, item.index, commands); });
   tab("Object", "Name, transform and clip.", [&] {
     object(shown, item, commands);
+    const settings::Clip before = shown.clip;
     clip_rows(ui_, shown.clip, box_of(model.scene, model.status.boxes, item));
+    // The clip's handles are those of the selected object.
+    if (shown.clip != before && !model.chosen) model.chosen = item;
   });
-  if (first) tab("Grids", "The grids of the file and its up axis.", [&] { grids(model, commands); });
+  tab("Grids", "The grids of the file and its up axis.", [&] {
+    if (first)
+      grids(model, commands);
+    else
+      up_axis(shown.up, shown.volume, commands);
+  });
   if (first && (model.status.play || model.status.neighbours))
     tab("Sequence", "Playback of numbered files.", [&] { sequence(model, commands); });
   ImGui::EndTabBar();
@@ -118,15 +121,19 @@ void Panel::grids(Model& model, std::vector<Command>& commands) {
   }
   if (!grids.empty() && ui_.choose("Grid name", "Density grid: a scalar fog volume of the file.", grids, now))
     model.scene.grid_name = model.grids[static_cast<std::size_t>(now)].name;
-  int up = static_cast<int>(model.scene.up);
+  up_axis(model.scene.up, "", commands);
+  if (ui_.button("Inspect grids", "Shows type, voxels, range and histogram of each grid, and lets you select one.",
+                 {-1.0f, 0.0f}))
+    commands.push_back({Action::grids_dialog});
+}
+
+void Panel::up_axis(UpAxis now, const std::string& other, std::vector<Command>& commands) {
+  int up = static_cast<int>(now);
   if (ui_.choose("Up axis", "Up axis of the volume. The file is loaded again and framed.",
                  {{"Y", static_cast<int>(UpAxis::y), "Y is up."},
                   {"Z", static_cast<int>(UpAxis::z), "Z is up, as in files of Blender and Mantaflow."}},
                  up))
-    commands.push_back({Action::choose_up, {}, up});
-  if (ui_.button("Inspect grids", "Shows type, voxels, range and histogram of each grid, and lets you select one.",
-                 {-1.0f, 0.0f}))
-    commands.push_back({Action::grids_dialog});
+    commands.push_back({Action::choose_up, other, up});
 }
 
 }  // namespace cumulet::demo

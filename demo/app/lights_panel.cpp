@@ -32,11 +32,14 @@ void Panel::analytic_light(Desc& analytic_light) {
   settings::for_each<Desc>([&](const auto& setting) {
     if (*setting.row.label == '\0' || !has(setting, analytic_light.kind)) return;  // no label: only in scene files
     auto& value = analytic_light.*setting.field;
+    settings::SettingInfo info = setting;
+    if (setting.is(&Desc::power))
+      info.row.format = analytic_light.kind == CUMULET_LIGHT_DISTANT ? "%.4g W/m²" : "%.4g W";
     if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, double[3]>) {
       const double length = std::hypot(value[0], value[1], value[2]);
       ui_.numbers(setting.row.label, setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
       // Without a reset, because the defaults of a light, such as no power, make no light.
-    } else if (rows_.draw(static_cast<const settings::SettingInfo&>(setting), value) && setting.is(&Desc::kind)) {
+    } else if (rows_.draw(info, value) && setting.is(&Desc::kind)) {
       // Changing the kind sets values that suit it: a distant light's power is in W/m², and a spot needs a cone angle.
       if (analytic_light.kind == CUMULET_LIGHT_DISTANT) analytic_light.power = static_cast<float>(sun_at_noon);
       if (analytic_light.kind == CUMULET_LIGHT_SPOT && analytic_light.angle_degrees == 0.0)

@@ -37,9 +37,9 @@ const std::vector<Shortcut>& shortcuts() {
   constexpr unsigned shift = modifier_shift;
   static const std::vector<Shortcut> all = {
       {GLFW_KEY_N, ctrl, {Action::new_scene}, "Ctrl+N", "New scene"},
-      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, surfaces, an environment or a scene"},
+      {GLFW_KEY_O, ctrl, {Action::open_dialog}, "Ctrl+O", "Open a volume, a model, an environment map or a scene"},
       {GLFW_KEY_S, ctrl, {Action::save_scene}, "Ctrl+S", "Save the scene"},
-      {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene as ..."},
+      {GLFW_KEY_S, ctrl | shift, {Action::save_scene_dialog}, "Ctrl+Shift+S", "Save the scene under another name"},
       {GLFW_KEY_F12, 0, {Action::render_dialog}, "F12", "Render a picture or a sequence in the background"},
       {GLFW_KEY_F12, ctrl, {Action::png_dialog}, "Ctrl+F12", "Save the displayed image as PNG"},
       {GLFW_KEY_F12, shift, {Action::exr_dialog}, "Shift+F12", "Save the displayed image as linear OpenEXR"},
@@ -155,6 +155,18 @@ double device_seconds(const cumulet_stats& stats) {
          stats.pass_seconds_trace + stats.pass_seconds_inspect + stats.pass_seconds_display;
 }
 
+Fields fields_of(const cumulet_volume& volume) {
+  Fields fields;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    cumulet_histogram_info values{};
+    values.struct_size = sizeof values;
+    if (cumulet_volume_get_histogram(&volume, static_cast<cumulet_ramp>(i), &values) == CUMULET_OK &&
+        values.max_value > 0.0f)
+      fields[i] = {values.max_value, heights(values.histogram)};
+  }
+  return fields;
+}
+
 Model::Model() {
   navigation.struct_size = sizeof navigation;
   navigation.speed = 1.0;
@@ -265,6 +277,11 @@ std::string scene_name(const Model& model) {
 
 std::string suggest_path(const Model& model, const std::string& ending) {
   std::string stem = fs::path(main_file(model.scene)).stem().string();
+  // A name with the mark of a frame number would be that of a sequence.
+  if (const std::size_t mark = stem.find('#'); mark != std::string::npos) {
+    stem.erase(mark);
+    stem.erase(stem.find_last_not_of("_-. ") + 1);
+  }
   if (stem.empty()) stem = "cumulet";
   const fs::path folder(model.preferences.folder);
   constexpr int most = 1000;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <frame_row.hpp>
+#include <instances.hpp>
 #include <map>
 #include <memory>
 #include <ocio_lut.hpp>
@@ -99,7 +100,8 @@ enum class Action {
   quit,          // asks about unsaved changes and unfinished pictures
   quit_anyway,   // asks only about unsaved changes
   follow_light,  // measures the exposure again, because the sun has moved
-  daylight       // sets the default daylight and display instead of the dusk of a burning volume
+  daylight,      // sets the default daylight and display instead of the dusk of a burning volume
+  keep_place     // text: "volume" or "model", value: its index; removes the transform that the program gave it
 };
 
 struct Command {
@@ -190,6 +192,18 @@ struct FieldValues {
   std::vector<float> heights;  // histogram from 0 to `most`; heights from 0 to 1
 };
 
+/// Values of a volume's grids, indexed by cumulet_ramp.
+using Fields = std::array<FieldValues, settings::ramps.size()>;
+/// Returns the values of a volume's grids. Any thread; takes some milliseconds per million voxels.
+[[nodiscard]] Fields fields_of(const cumulet_volume& volume);
+
+/// A volume of the scene other than the first one, without its data.
+struct OtherVolume {
+  VolumeFile file;
+  OpenVolume open;  // without `volume`
+  Fields fields;
+};
+
 /// Converts counts to bar heights from 0 to 1, on a logarithmic scale.
 [[nodiscard]] std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]);
 
@@ -217,15 +231,16 @@ struct Status {
   std::string loading;                 // file that is being loaded
   ThumbnailPtr thumbnail;              // of the displayed environment; null: no environment, or not ready
   bool has_volume = false;
-  bool has_content = false;                                // a volume, surfaces or an environment are shown
-  std::string saving;                                      // file that is saved when all pixels have a sample; "": none
-  std::optional<Play> play;                                // if the volume is a sequence
-  std::optional<FrameRow> neighbours;                      // numbered files that the volume's file belongs to
-  std::string grid;                                        // name of the displayed grid
-  std::optional<double> noise;                             // relative standard error; nullopt if it is unknown
-  std::array<FieldValues, settings::ramps.size()> fields;  // values of the grid of each ramp
-  Boxes boxes;                                             // bounding boxes of the loaded files
-  std::shared_ptr<const OcioDisplays> ocio;                // of the OpenColorIO configuration in use; null: none
+  bool has_content = false;                  // a volume, surfaces or an environment are shown
+  std::string saving;                        // file that is saved when all pixels have a sample; "": none
+  std::optional<Play> play;                  // if the volume is a sequence
+  std::optional<FrameRow> neighbours;        // numbered files that the volume's file belongs to
+  std::string grid;                          // name of the displayed grid
+  std::optional<double> noise;               // relative standard error; nullopt if it is unknown
+  Fields fields;                             // of the first volume
+  std::vector<OtherVolume> others;           // that are open
+  Boxes boxes;                               // bounding boxes of the loaded files
+  std::shared_ptr<const OcioDisplays> ocio;  // of the OpenColorIO configuration in use; null: none
 };
 
 /// Statistics that are plotted over time.

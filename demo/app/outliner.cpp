@@ -119,7 +119,7 @@ void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Comm
     for (const Item& one : items)
       if (one.kind == kind) item(model, one, commands);
   };
-  group("Lights", "Add light", "Adds a point light above the camera's target.", Action::add_light, commands);
+  group("Lights", "Add light", "Adds a point light in view, above the camera's target.", Action::add_light, commands);
   all(Item::Kind::analytic_light);
   group("Volumes", "Add volume", "Adds another volume.", Action::add_volume_dialog, commands);
   all(Item::Kind::volume);
@@ -142,8 +142,11 @@ bool Outliner::row(const std::string& control, const char* tip, const std::strin
   const float width = ImGui::GetContentRegionAvail().x - room - gap;
   const Item* const object = std::get_if<Item>(&subject);
   const bool selected = object != nullptr ? contains(selected_, *object) : subject_of(model) == subject;
+  // A selected row keeps its color below the pointer.
+  if (selected) ImGui::PushStyleColor(ImGuiCol_HeaderHovered, ImGui::GetStyleColorVec4(ImGuiCol_Header));
   const bool clicked = ImGui::Selectable(("##" + control).c_str(), selected, ImGuiSelectableFlags_AllowDoubleClick,
                                          {std::max(width, 1.0f), 0.0f});
+  if (selected) ImGui::PopStyleColor();
   ui_.remember(control.c_str(), tip);
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const float height = ImGui::GetTextLineHeight();

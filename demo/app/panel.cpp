@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
-#include <presets.hpp>
 #include <settings.hpp>
 #include <string>
 #include <utility>
@@ -35,6 +34,12 @@ std::string print(const char* format, Values... values) {
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), format, values...);  // NOLINT(cppcoreguidelines-pro-type-vararg)
   return text.data();
+}
+
+/// Returns a format that prints an hour as a clock does: "14:12 (14.20 h)". The number is what the user can type.
+std::string clock_text(double hour) {
+  const auto minutes = static_cast<int>(std::lround(hour * 60.0));
+  return print("%d:%02d", minutes / 60, minutes % 60) + "  (%.2f h)";
 }
 
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
@@ -93,7 +98,8 @@ void Panel::side(Model& model, std::vector<Command>& commands) {
   ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
   ImGui::Begin(panel_name, nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing);
+                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
+                   ImGuiWindowFlags_NoScrollWithMouse);
   ImGui::PopStyleVar();
   edge(model);
   // The inspector keeps at least three fifths of the height.
@@ -193,7 +199,7 @@ bool Panel::time_of_day(cumulet_sun_sky_desc& light) {
           "Time of day",
           "Moves the sun along its path over a day at the equinox: it rises at 6 and sets at 18 hours. The dial "
           "turns the path.",
-          hour, SunPath::first_hour, SunPath::last_hour, "%.2f h"))
+          hour, SunPath::first_hour, SunPath::last_hour, clock_text(hour).c_str()))
     return false;
   const SunAngles moved = sun_path_->at(hour);
   light.sun_azimuth_degrees = static_cast<float>(moved.azimuth);
@@ -257,58 +263,6 @@ void Panel::variant(Model& model) {
   // If names are empty or ambiguous, the variant is stored by number.
   if (chosen > 0 && std::ranges::find(names, wanted) - names.begin() != chosen - 1) wanted = std::to_string(index);
   if (chosen > 0 && wanted.empty()) wanted = std::to_string(index);
-}
-
-namespace {
-
-/// Returns true if the setting has an effect: the phase function has it, and the volume has the grid that it scales.
-/// flame_colors: a color ramp replaces the color of flames.
-template <class Setting>
-bool acts(const Setting& setting, const cumulet_medium_desc& medium, const Status& status, bool flame_colors) {
-  using Desc = cumulet_medium_desc;
-  if (setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight))
-    return medium.phase == CUMULET_PHASE_TWO_LOBE;
-  if (setting.is(&Desc::droplet_diameter)) return medium.phase == CUMULET_PHASE_MIE;
-  if (setting.is(&Desc::anisotropy)) return medium.phase != CUMULET_PHASE_MIE;
-  const auto has = [&](cumulet_ramp grid) { return status.fields[static_cast<std::size_t>(grid)].most > 0.0f; };
-  if (setting.is(&Desc::flame_color) && flame_colors) return false;
-  if (setting.is(&Desc::flame_strength) || setting.is(&Desc::flame_color)) return has(CUMULET_RAMP_FLAME);
-  const bool of_heat = setting.is(&Desc::temperature_scale) || setting.is(&Desc::temperature_offset) ||
-                       setting.is(&Desc::blackbody) || setting.is(&Desc::blackbody_tint);
-  return !of_heat || has(CUMULET_RAMP_TEMPERATURE);
-}
-
-}  // namespace
-
-void Panel::medium(Model& model, std::vector<Command>& commands) {
-  using Desc = cumulet_medium_desc;
-  Desc& medium = model.scene.medium;
-  std::vector<Choice> presets;
-  presets.reserve(preset_choices.size());
-  for (const settings::Choice& preset : preset_choices) presets.push_back({preset.label, preset.value, preset.tip});
-  const std::optional<Preset> now = preset_of(medium);
-  int chosen = now ? static_cast<int>(*now) : -1;
-  if (ui_.choose("Preset", "Preset of the medium; does not change the density scale and the ramps.", presets, chosen))
-    apply(static_cast<Preset>(chosen), medium);
-  settings::for_each<Desc>([&](const auto& setting) {
-    if (!acts(setting, medium, model.status, !model.scene.color_ramps[CUMULET_RAMP_FLAME].empty())) return;
-    rows_.draw(setting, medium.*setting.field);
-    if (setting.is(&Desc::density_scale) && model.status.has_volume &&
-        ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f}))
-      commands.push_back({Action::auto_density});
-    if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
-  });
-  ramps(model);
-}
-
-/// Draws a slider for the absorption. A cloud's absorption is far below the resolution of a color field.
-void Panel::absorption(float (&coalbedo)[3]) {
-  float mean = (coalbedo[0] + coalbedo[1] + coalbedo[2]) / 3.0f;
-  const float before = mean;
-  if (!ui_.slider("Absorption", "Mean fraction of light that is absorbed: 1 - albedo.", mean, 0.0f, 1.0f, "%.4g",
-                  ImGuiSliderFlags_Logarithmic))
-    return;
-  for (float& one : coalbedo) one = before > 0.0f ? std::min(one * mean / before, 1.0f) : mean;
 }
 
 void Panel::grid(Model& model) {
@@ -484,7 +438,7 @@ void Panel::loading(const Model& model, std::vector<Command>& commands) {
   ImGui::SetNextWindowBgAlpha(0.88f);
   ImGui::Begin("loading", nullptr, overlay & ~ImGuiWindowFlags_AlwaysAutoResize);
   const float button = ui_.px(76.0f);
-  const std::string name = file_name(model.status.loading.empty() ? model.scene.volume : model.status.loading);
+  const std::string name = file_name(file_of_work(model));
   ImGui::TextUnformatted(work.name);
   if (!name.empty()) {
     ImGui::SameLine();
@@ -529,7 +483,7 @@ void Panel::state_line(const Model& model) {
 void Panel::help(Model& model) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
-  ImGui::SetNextWindowBgAlpha(0.97f);
+  ImGui::SetNextWindowBgAlpha(1.0f);
   ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, screen);
   if (help_was_closed_) ImGui::SetNextWindowFocus();
   ImGui::Begin("Keys and mouse", &model.help,

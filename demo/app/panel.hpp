@@ -53,6 +53,8 @@ class Panel {
   void object(SceneVolume& volume, const Item& item, std::vector<Command>& commands);
   void name_row(std::string& name);
   void grids(Model& model, std::vector<Command>& commands);
+  // Draws the up axis of a volume. other: the file of a further volume, "" for the first one.
+  void up_axis(UpAxis now, const std::string& other, std::vector<Command>& commands);
   void camera(Model& model, std::vector<Command>& commands);
   /// Draws the saved cameras of the scene.
   void cameras(Model& model);
@@ -65,19 +67,20 @@ class Panel {
   // Draws the rows of a transform. Returns the new transform if the user changed it.
   std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& transform);
   void one_model(SceneModel& one);
-  void other_medium(SceneVolume& other);
   void analytic_light(cumulet_light_desc& analytic_light);
   void sequence(Model& model, std::vector<Command>& commands);
   /// Draws the timeline below the image: the frames, their states and the current frame.
   void timeline(Model& model, std::vector<Command>& commands);
-  void medium(Model& model, std::vector<Command>& commands);
-  void ramps(Model& model);
-  // Draws the presets of a ramp, and the buttons that copy and paste it.
-  void shape_ramp(Model& model, std::size_t index);
-  // Draws a color ramp, if the volume has its grid.
-  void color_ramp(Model& model, std::size_t index);
+  // Draws the medium and the ramps of a volume. index: 0 for the first one.
+  void medium(Model& model, std::size_t index, std::vector<Command>& commands);
+  // Draws the ramps of a volume. fields: the values of its grids.
+  void ramps(Model& model, SceneVolume& volume, const Fields& fields);
+  // Draws the presets of a ramp, and the buttons that copy and paste it. most: the largest value of its grid.
+  void shape_ramp(Model& model, settings::RampPoints& points, std::size_t index, float most);
+  // Draws a color ramp.
+  void color_ramp(Model& model, SceneVolume& volume, std::size_t index, float most);
   // Draws the presets of a color ramp, and the buttons that copy and paste it.
-  void choose_colors(Model& model, std::size_t index);
+  void choose_colors(Model& model, settings::ColorStops& stops, std::size_t index, float most);
   void surfaces(Model& model);
   void variant(Model& model);
   void grid(Model& model);

@@ -22,47 +22,48 @@ std::string label_of(const char* grid, const char* rest) {
   return label;
 }
 
-float reach_of(const FieldValues& field) {
-  return field.most > 0.0f ? std::min(field.most, settings::max_ramp_value) : 1.0f;
-}
+float reach_of(float most) { return most > 0.0f ? std::min(most, settings::max_ramp_value) : 1.0f; }
 
 }  // namespace
 
-void Panel::ramps(Model& model) {
-  for (std::size_t i = 0; i < model.scene.ramps.size(); ++i) {
+void Panel::ramps(Model& model, SceneVolume& volume, const Fields& fields) {
+  for (std::size_t i = 0; i < volume.ramps.size(); ++i) {
     const settings::RampInfo& info = settings::ramps[i];
-    const FieldValues& field = model.status.fields[i];
-    settings::RampPoints& points = model.scene.ramps[i];
-    RampView& view = ramp_views_[i];
-    bool on = !points.empty();
-    if (ui_.checkbox(info.label, info.tip, on)) {
-      const float most = reach_of(field);
-      points.clear();
-      if (on) points = {{0.0f, 0.0f}, {most, most}};
+    const FieldValues& field = fields[i];
+    settings::RampPoints& points = volume.ramps[i];
+    const bool has_grid = field.most > 0.0f;
+    // A ramp of a grid that the volume does not have can only be removed.
+    if (has_grid || !points.empty()) {
+      RampView& view = ramp_views_[i];
+      bool on = !points.empty();
+      if (ui_.checkbox(info.label, info.tip, on)) {
+        const float most = reach_of(field.most);
+        points.clear();
+        if (on) points = {{0.0f, 0.0f}, {most, most}};
+      }
+      fit(view, points, field.most);
+      if (!points.empty()) {
+        shape_ramp(model, points, i, field.most);
+        ui_.curve((std::string(info.label) + " curve").c_str(),
+                  "Drag to move a point. Click to add one. Right-click removes it.", points, view, field.heights,
+                  field.most);
+        double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
+        if (ui_.numbers(info.point, "Input and output value of the selected point.", chosen, 0.005f * view.max_value))
+          move_point(points, view.chosen, {static_cast<float>(chosen[0]), static_cast<float>(chosen[1])});
+      }
     }
-    fit(view, points, field.most);
-    if (!points.empty()) {
-      shape_ramp(model, i);
-      ui_.curve((std::string(info.label) + " curve").c_str(),
-                "Drag to move a point. Click to add one. Right-click removes it.", points, view, field.heights,
-                field.most);
-      double chosen[2] = {static_cast<double>(points[view.chosen][0]), static_cast<double>(points[view.chosen][1])};
-      if (ui_.numbers(info.point, "Input and output value of the selected point.", chosen, 0.005f * view.max_value))
-        move_point(points, view.chosen, {static_cast<float>(chosen[0]), static_cast<float>(chosen[1])});
-    }
-    color_ramp(model, i);
+    if (has_grid || !volume.color_ramps[i].empty()) color_ramp(model, volume, i, field.most);
   }
 }
 
-void Panel::shape_ramp(Model& model, std::size_t index) {
+void Panel::shape_ramp(Model& model, settings::RampPoints& points, std::size_t index, float most) {
   const settings::RampInfo& info = settings::ramps[index];
-  settings::RampPoints& points = model.scene.ramps[index];
   std::vector<Choice> choices;
   for (const RampPreset& preset : ramp_presets())
     choices.push_back({preset.label, static_cast<int>(choices.size()), preset.tip});
   int chosen = -1;
   if (ui_.choose(label_of(info.name, " shape").c_str(), "Replaces the curve by a common one.", choices, chosen))
-    points = points_of(ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(model.status.fields[index]));
+    points = points_of(ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(most));
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const std::string id = std::string("##") + info.name;
   if (ui_.button(("Copy" + id).c_str(), "Copies the curve as text, which the command line takes too.", {width, 0.0f}))
@@ -76,20 +77,18 @@ void Panel::shape_ramp(Model& model, std::size_t index) {
     show_message(model, false, "The clipboard has no curve", time_);
 }
 
-void Panel::color_ramp(Model& model, std::size_t index) {
+void Panel::color_ramp(Model& model, SceneVolume& volume, std::size_t index, float most) {
   const settings::ColorRampInfo& info = settings::color_ramps[index];
-  const FieldValues& field = model.status.fields[index];
-  if (!(field.most > 0.0f)) return;
-  settings::ColorStops& stops = model.scene.color_ramps[index];
+  settings::ColorStops& stops = volume.color_ramps[index];
   ColorRampView& view = color_ramp_views_[index];
   bool on = !stops.empty();
   if (ui_.checkbox(info.label, info.tip, on)) {
     stops.clear();
-    if (on) stops = first_stops(index, reach_of(field), model.scene.medium);
+    if (on) stops = first_stops(index, reach_of(most), volume.medium);
   }
-  fit(view, stops, field.most);
+  fit(view, stops, most);
   if (stops.empty()) return;
-  choose_colors(model, index);
+  choose_colors(model, stops, index, most);
   ui_.gradient((std::string(info.label) + " bar").c_str(),
                "Drag to move a stop. Click to add one. Right-click, Delete or a drag off the bar removes it.", stops,
                view);
@@ -105,16 +104,15 @@ void Panel::color_ramp(Model& model, std::size_t index) {
     for (std::size_t i = 0; i < 3; ++i) stop[i + 1] = peak * color[i];
 }
 
-void Panel::choose_colors(Model& model, std::size_t index) {
+void Panel::choose_colors(Model& model, settings::ColorStops& stops, std::size_t index, float most) {
   const settings::ColorRampInfo& info = settings::color_ramps[index];
-  settings::ColorStops& stops = model.scene.color_ramps[index];
   std::vector<Choice> choices;
   for (const ColorRampPreset& preset : color_ramp_presets())
     choices.push_back({preset.label, static_cast<int>(choices.size()), preset.tip});
   int chosen = -1;
   if (ui_.choose((std::string("Palette##") + info.label).c_str(), "Replaces the colors by common ones.", choices,
                  chosen))
-    stops = stops_of(color_ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(model.status.fields[index]));
+    stops = stops_of(color_ramp_presets()[static_cast<std::size_t>(chosen)], reach_of(most));
   const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const std::string id = std::string("##") + info.label;
   if (ui_.button(("Copy" + id).c_str(), "Copies the colors as text, which the command line takes too.", {width, 0.0f}))

@@ -5,8 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <program.hpp>
 #include <system_error>
@@ -20,7 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int low_priority = 10;  // the user's work comes first
+constexpr int low_priority = 10;       // the user's work comes first
+constexpr const char* part = ".part";  // ending of an unfinished thumbnail, behind the number of its process
 
 }  // namespace
 
@@ -54,20 +58,15 @@ std::string RecentThumbnails::find(const std::string& file) const {
   return !picture.empty() && fs::is_regular_file(picture, error) ? picture : "";
 }
 
-void RecentThumbnails::follow(std::span<const std::string> files) {
-  if (program_.empty() || folder_.empty()) return;
-  if (making_) {
-    const auto status = making_->process->status();
-    if (!status) return;
-    std::error_code error;
-    const bool made = WIFEXITED(*status) && WEXITSTATUS(*status) == 0;
-    if (made) fs::rename(making_->unfinished, making_->picture, error);
-    if (!made || error) {
-      failed_[making_->file] = making_->picture;
-      fs::remove(making_->unfinished, error);
-    }
-    making_.reset();
-  }
+bool RecentThumbnails::follow(std::span<const std::string> files, double now) {
+  constexpr double pause = 1.0;  // seconds between two looks at unchanged files
+  if (program_.empty() || folder_.empty()) return false;
+  const bool worked = works();
+  if (worked && !finish()) return false;
+  if (!worked && now < next_look_ && std::ranges::equal(files, followed_)) return false;
+  followed_.assign(files.begin(), files.end());
+  next_look_ = now + pause;
+  if (!std::exchange(removed_left_, true)) remove_left();
   for (const std::string& file : files) {
     const std::string picture = path_for(file);
     std::error_code error;
@@ -77,12 +76,39 @@ void RecentThumbnails::follow(std::span<const std::string> files) {
     begin(file, picture);
     break;
   }
+  return true;
+}
+
+bool RecentThumbnails::finish() {
+  const auto status = making_->process->status();
+  if (!status) return false;
+  std::error_code error;
+  const bool made = WIFEXITED(*status) && WEXITSTATUS(*status) == 0;
+  if (made) fs::rename(making_->unfinished, making_->picture, error);
+  if (!made || error) {
+    failed_[making_->file] = making_->picture;
+    fs::remove(making_->unfinished, error);
+  }
+  making_.reset();
+  return true;
+}
+
+void RecentThumbnails::remove_left() const {
+  std::error_code error;
+  std::vector<fs::path> left;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+    if (entry.path().extension() != part) continue;
+    const std::string owner = entry.path().stem().extension().string();  // ".123"
+    const long process = owner.empty() ? 0 : std::strtol(owner.c_str() + 1, nullptr, 10);
+    if (process > 0 && ::kill(static_cast<pid_t>(process), 0) != 0 && errno == ESRCH) left.push_back(entry.path());
+  }
+  for (const fs::path& path : left) fs::remove(path, error);
 }
 
 void RecentThumbnails::begin(const std::string& file, const std::string& picture) {
   std::error_code error;
   fs::create_directories(folder_, error);
-  const std::string unfinished = picture + '.' + std::to_string(::getpid()) + ".part";
+  const std::string unfinished = picture + '.' + std::to_string(::getpid()) + part;
   std::vector<std::string> arguments = {program_, "--thumbnail", std::to_string(side), "-o", unfinished};
   if (has_ending(file, ".json")) arguments.emplace_back("--scene");
   arguments.push_back(file);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "child_process.hpp"
 
@@ -23,8 +24,9 @@ class RecentThumbnails {
   /// Ends the program if it runs.
   ~RecentThumbnails();
 
-  /// Begins the next missing thumbnail of these files. Call it repeatedly.
-  void follow(std::span<const std::string> files);
+  /// Begins the next missing thumbnail of these files. Call it repeatedly. It looks for changed files once per second.
+  /// now: in seconds. Returns true if thumbnails may have changed since the last call.
+  bool follow(std::span<const std::string> files, double now);
   /// Ends the current thumbnail's rendering, for example because the user has opened a file. It is begun again later.
   void stop();
   [[nodiscard]] bool works() const { return making_.has_value(); }
@@ -41,10 +43,17 @@ class RecentThumbnails {
   // Returns the path that the file's thumbnail has or gets; "" for a file that is missing or of another kind.
   [[nodiscard]] std::string path_for(const std::string& file) const;
   void begin(const std::string& file, const std::string& picture);
+  // Takes the thumbnail of a program that has ended. Returns false if the program still runs.
+  bool finish();
+  // Removes the unfinished thumbnails that killed programs have left.
+  void remove_left() const;
 
   std::string program_;
   std::string folder_;
   std::optional<Making> making_;
+  std::vector<std::string> followed_;          // files of the last look
+  double next_look_ = 0.0;                     // in seconds
+  bool removed_left_ = false;                  // unfinished thumbnails of ended programs were removed
   std::map<std::string, std::string> failed_;  // file and the path of the thumbnail that could not be made
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <aov_table.hpp>
 #include <array>
+#include <filesystem>
 #include <string>
 
 namespace cumulet::demo {
@@ -39,6 +40,7 @@ void RenderDialog::open(const Model& model) {
                        play->row.number(played.first_frame + std::max(played.frame_count, 1U) - 1)};
   }
   settings_.file.path = suggest_path(model, ending_of(settings_.file.format));
+  folder_ = std::filesystem::path(settings_.file.path).parent_path();
   adapt_path();
 }
 
@@ -149,6 +151,8 @@ void RenderDialog::draw(Ui& ui, const Model& model, std::vector<Command>& comman
   const bool escape = ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape)) && !ImGui::IsAnyItemActive();
   if (ui.button("Close render", "Closes the dialog (Escape).", size) || escape) close();
   if (starts) {
+    // A name that was typed belongs to the folder of the suggested file.
+    settings_.file.path = (folder_ / settings_.file.path).lexically_normal().string();
     adapt_path();
     problem_ = problem_of(settings_);
     if (problem_.empty()) {

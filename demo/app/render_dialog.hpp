@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ class RenderDialog {
   bool opening_ = false;
   bool open_ = false;
   PictureSettings settings_;
-  std::string problem_;  // of the settings when the user wanted to start
+  std::filesystem::path folder_;  // of the suggested file
+  std::string problem_;           // of the settings when the user wanted to start
 };
 
 }  // namespace cumulet::demo

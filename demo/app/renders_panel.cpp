@@ -55,8 +55,10 @@ void draw_entry(Ui& ui, const RenderEntry& entry, std::vector<Command>& commands
 void draw_renders(Ui& ui, const Rectangle& view, Model& model, std::vector<Command>& commands) {
   if (!model.renders_open) return;
   const float room = static_cast<float>(view.width) - ui.px(24.0f);
+  // Beside the progress of loading, or below it if the image is narrow.
+  const bool narrow = static_cast<float>(view.width) < ui.px(1090.0f);
   const ImVec2 corner(static_cast<float>(view.x + view.width) - ui.px(12.0f),
-                      static_cast<float>(view.y) + ui.px(12.0f));
+                      static_cast<float>(view.y) + ui.px(narrow ? 84.0f : 12.0f));
   ImGui::SetNextWindowPos(corner, ImGuiCond_Always, {1.0f, 0.0f});
   ImGui::SetNextWindowSize({std::min(ui.px(340.0f), room), 0.0f});
   ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, {room, static_cast<float>(view.height) * 0.6f});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <glm/glm.hpp>
 #include <numbers>
 #include <settings.hpp>
 #include <utility>
@@ -136,20 +137,43 @@ namespace {
 // Half of the noon sun's in W/m², because parts of the scene are nearer to the light.
 constexpr double new_light_irradiance = 2.0;
 
+/// Returns the offset of a new light from the camera's target: above it, to the right and nearer to the camera, within
+/// the image.
+glm::dvec3 light_offset(const cumulet_camera_desc& camera) {
+  using glm::dvec3;
+  constexpr double library_fovy = 40.0;
+  const dvec3 back(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1],
+                   camera.eye[2] - camera.target[2]);
+  const double distance = glm::length(back);
+  const dvec3 backward = distance > 0.0 ? back / distance : dvec3(0.0, 0.0, 1.0);
+  dvec3 up(camera.up[0], camera.up[1], camera.up[2]);
+  if (up == dvec3(0.0)) up = {0.0, 1.0, 0.0};
+  dvec3 right = glm::cross(up, backward);
+  // A camera that looks along its up direction has no right side of its own.
+  right = glm::length(right) > 1e-9 * glm::length(up) ? glm::normalize(right) : dvec3(1.0, 0.0, 0.0);
+  const double fovy = (camera.fovy_degrees > 0.0 ? camera.fovy_degrees : library_fovy) * std::numbers::pi / 180.0;
+  double half_height = distance > 0.0 ? distance * std::tan(0.5 * fovy) : 1.0;
+  if (camera.orthographic_height > 0.0) half_height = 0.5 * camera.orthographic_height;
+  // A wide view is limited by the distance, so that the light is in front of the camera.
+  if (distance > 0.0) half_height = std::min(half_height, distance);
+  return half_height * (0.55 * glm::normalize(glm::cross(backward, right)) + 0.4 * right + 0.4 * backward);
+}
+
 }  // namespace
 
 void add_light(Model& model) {
   const cumulet_camera_desc& camera = model.scene.camera;
-  const double distance =
-      std::hypot(camera.eye[0] - camera.target[0], camera.eye[1] - camera.target[1], camera.eye[2] - camera.target[2]);
-  const double above = distance > 0.0 ? 0.5 * distance : 1.0;
+  const glm::dvec3 target(camera.target[0], camera.target[1], camera.target[2]);
+  const glm::dvec3 offset = light_offset(camera);
+  const double distance = glm::length(offset);
   cumulet_light_desc& light = model.scene.analytic_lights.emplace_back();
   light.struct_size = sizeof light;
-  std::copy(camera.target, camera.target + 3, light.position);
-  light.position[1] += above;
-  light.direction[1] = -1.0;
+  for (int i = 0; i < 3; ++i) {
+    light.position[i] = target[i] + offset[i];
+    light.direction[i] = -offset[i] / distance;
+  }
   const double irradiance = new_light_irradiance * std::exp2(-static_cast<double>(model.scene.display.exposure_stops));
-  light.power = static_cast<float>(irradiance * 4.0 * std::numbers::pi * above * above);
+  light.power = static_cast<float>(irradiance * 4.0 * std::numbers::pi * distance * distance);
   settings::spell_out_zeros(light);
   select(model, Item{Item::Kind::analytic_light, model.scene.analytic_lights.size() - 1, 0});
 }

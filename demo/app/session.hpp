@@ -296,7 +296,7 @@ class Session {
   Instances others_;
   struct Opening {
     VolumeFile file;
-    std::future<OpenVolume> made;  // valid while a volume is being opened
+    std::future<OtherVolume> made;  // valid while a volume is being opened
   } opening_;
   Models models_;
   struct OpeningModel {

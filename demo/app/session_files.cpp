@@ -150,14 +150,7 @@ void Session::finish_load() {
     status_.grid = info.name;
     shown_box_ = box_of(info);
   }
-  status_.fields = {};
-  for (std::size_t i = 0; volume && i < status_.fields.size(); ++i) {
-    cumulet_histogram_info values{};
-    values.struct_size = sizeof values;
-    if (cumulet_volume_get_histogram(volume.get(), static_cast<cumulet_ramp>(i), &values) == CUMULET_OK &&
-        values.max_value > 0.0f)
-      status_.fields[i] = {values.max_value, heights(values.histogram)};
-  }
+  status_.fields = volume ? fields_of(*volume) : Fields();
   std::array<char, 512> error{};
   // For a sequence, the grids are those of the first readable frame.
   const auto file = [&](std::uint32_t i) { return playing_.row ? playing_.row->file(i) : volume_.shown.volume; };
@@ -177,6 +170,9 @@ void Session::finish_load() {
 
 void Session::follow_others() {
   known_->others = scene_.others;
+  std::erase_if(status_.others, [this](const OtherVolume& other) {
+    return std::ranges::none_of(scene_.others, [&](const VolumeFile& file) { return file == other.file; });
+  });
   try {
     others_.show(viewer_.get(), scene_.others);
   } catch (const std::runtime_error& error) {
@@ -192,7 +188,11 @@ void Session::follow_others() {
                   : std::shared_ptr<cumulet_volume>(shown());
   opening_.made = std::async(std::launch::async, [file = opening_.file, own, shared = shared_.get()] {
     const Opened opened{shared, &Shared::opened};
-    return own ? look_into(own) : open_volume(file, on_log, shared);
+    OtherVolume made{file, {}, {}};
+    const auto see = [&made](const cumulet_volume& volume) { made.fields = fields_of(volume); };
+    if (own) see(*own);
+    made.open = own ? look_into(own) : open_volume(file, on_log, shared, see);
+    return made;
   });
 }
 
@@ -203,7 +203,10 @@ void Session::finish_others() {
   }
   OpenVolume volume;
   try {
-    volume = opening_.made.get();
+    OtherVolume made = opening_.made.get();
+    volume = made.open;
+    made.open.volume.reset();
+    status_.others.push_back(std::move(made));
     events_.files.push_back({opening_.file.volume, Answer::File::Fate::opened});
   } catch (const std::runtime_error& error) {
     add_notice(true, error.what());

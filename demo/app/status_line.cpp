@@ -18,6 +18,11 @@ std::string print(const char* format, Values... values) {
   return text.data();
 }
 
+/// Returns true until the image has a sample per pixel.
+bool has_no_samples(const Status& status) {
+  return static_cast<double>(status.stats.samples) < static_cast<double>(status.frame.width) * status.frame.height;
+}
+
 bool has_flag(const Status& status, unsigned flag) { return (status.frame.flags & flag) != 0; }
 
 /// Returns the completed samples per pixel, of all or without a number to reach.
@@ -57,12 +62,15 @@ std::string status_text(const Model& model) {
   const std::string view = view_text(model.scene.sampling.view);
   std::string text = view.empty() ? samples_text(model) : view;
   // During a preview the image has no samples of its size.
-  if (has_flag(status, CUMULET_RENDER_PREVIEW)) text = "Preview";
+  const bool preview = has_flag(status, CUMULET_RENDER_PREVIEW);
+  if (preview) text = "Preview";
   const bool refines = has_flag(status, CUMULET_RENDER_INCOMPLETE);
   if (refines && model.seconds_left) text += ", " + format_duration(*model.seconds_left) + " left";
   const auto noise = shown_noise(status);
-  if (view.empty() && model.scene.display.denoise != CUMULET_DENOISE_OFF)
-    text += ", denoised";
+  // The first samples of an image are shown before they are denoised.
+  const bool denoises = view.empty() && model.scene.display.denoise != CUMULET_DENOISE_OFF;
+  if (denoises)
+    text += preview || has_no_samples(status) ? "" : ", denoised";
   else if (noise)
     text += print(", noise %.2f %%", 100.0 * *noise);
   if (model.navigation.fly != 0) text += "   flying";
@@ -70,6 +78,11 @@ std::string status_text(const Model& model) {
     text += "   saving " + std::filesystem::path(status.saving).filename().string() + " when all pixels are sampled";
   if (status.frame.width > 0) text += print("   %ux%u", status.frame.width, status.frame.height);
   return text;
+}
+
+std::string file_of_work(const Model& model) {
+  if (!model.status.loading.empty()) return model.status.loading;
+  return model.scene.others.empty() ? model.scene.volume : std::string();
 }
 
 }  // namespace cumulet::demo

@@ -15,4 +15,8 @@ namespace cumulet::demo {
 /// left out while the denoised image is displayed.
 [[nodiscard]] std::string status_text(const Model& model);
 
+/// Returns the file that is being loaded, or whose grid is being built; "" if that is unknown, because the scene has
+/// several volumes.
+[[nodiscard]] std::string file_of_work(const Model& model);
+
 }  // namespace cumulet::demo

@@ -1,12 +1,54 @@
 // The sequence section of the panel, and the timeline below the image.
 
+#include <imgui.h>
+
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include "panel.hpp"
 
 namespace cumulet::demo {
+namespace {
+
+/// Returns true if the setting has an effect with this interpolation between frames.
+template <class Setting>
+bool acts(const Setting& setting, const cumulet_playback_desc& playback) {
+  using Desc = cumulet_playback_desc;
+  if (setting.is(&Desc::subframes)) return playback.interpolation != CUMULET_FRAME_INTERPOLATION_NONE;
+  return !setting.is(&Desc::velocity_scale) || playback.interpolation == CUMULET_FRAME_INTERPOLATION_ADVECT;
+}
+
+/// Returns the least difference of two numbers on the timeline that is at least this: 1, 2 or 5 times a power of ten.
+std::uint32_t tick_step(double least) {
+  for (double power = 1.0;; power *= 10.0)
+    for (const double digit : {1.0, 2.0, 5.0})
+      if (digit * power >= least) return static_cast<std::uint32_t>(digit * power);
+}
+
+/// Draws the numbers of frames over the timeline, each at the left of its frame.
+void draw_numbers(const Ui& ui, const Play& play, ImVec2 corner, ImVec2 room) {
+  const std::uint32_t count = play.row.count();
+  const Frame last = play.row.number(count - 1);
+  const float frame_width = room.x / static_cast<float>(count);
+  const float text_width = ImGui::CalcTextSize(std::to_string(last).c_str()).x + ui.px(16.0f);
+  // Files may be numbered in steps.
+  const double stride = count > 1 ? static_cast<double>(last - play.row.number(0)) / (count - 1) : 1.0;
+  const std::uint32_t step = tick_step(stride * static_cast<double>(text_width / std::max(frame_width, 1e-3f)));
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Frame number = play.row.number(i);
+    if (number % static_cast<Frame>(step) != 0) continue;
+    const float x = corner.x + frame_width * static_cast<float>(i);
+    const bool on_white = i == play.info.requested_frame;
+    list.AddLine({x, corner.y}, {x, corner.y + 0.3f * room.y}, IM_COL32(134, 141, 152, 160), ui.px(1.0f));
+    list.AddText({x + ui.px(3.0f), corner.y - ui.px(1.0f)},
+                 on_white ? IM_COL32(20, 22, 26, 255) : IM_COL32(170, 177, 187, 255), std::to_string(number).c_str());
+  }
+}
+
+}  // namespace
 
 void Panel::sequence(Model& model, std::vector<Command>& commands) {
   if (!model.status.play) {
@@ -18,8 +60,11 @@ void Panel::sequence(Model& model, std::vector<Command>& commands) {
   }
   const Play& play = *model.status.play;
   SceneSequence& sequence = model.scene.sequence;
-  settings::for_each<cumulet_playback_desc>(
-      [&](const auto& setting) { rows_.draw(setting, sequence.playback.*setting.field); });
+  using Desc = cumulet_playback_desc;
+  settings::for_each<Desc>([&](const auto& setting) {
+    if (!acts(setting, sequence.playback)) return;
+    rows_.draw(setting, sequence.playback.*setting.field);
+  });
   const Frame least = play.row.number(0);
   const Frame most = play.row.number(play.row.count() - 1);
   const cumulet_playback_desc played = playback_of(sequence, play.row);
@@ -72,7 +117,8 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
     const auto index = static_cast<std::uint32_t>(std::clamp(std::floor(part * count), 0.0f, count - 1.0f));
     commands.push_back({Action::go_to, {}, static_cast<int>(index)});
   }
-  ui_.remember("Playhead", "Drag to select a frame. Blue: ready; red: cannot be read.");
+  ui_.remember("Playhead",
+               "Drag to select a frame. White: requested, amber: displayed; blue: ready, red: cannot be read.");
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const auto x_of = [&](float index) { return corner.x + room.x * index / count; };
   const auto bar = [&](float from, float to, float high, float low, ImU32 color) {
@@ -94,6 +140,7 @@ void Panel::timeline(Model& model, std::vector<Command>& commands) {
   }
   const auto asked = static_cast<float>(play.info.requested_frame);
   bar(asked, asked + 1.0f, 0.0f, 1.0f, IM_COL32(236, 236, 236, 200));
+  draw_numbers(ui_, play, corner, room);
   if (other) {
     const auto drawn = static_cast<float>(play.info.displayed_frame);
     bar(drawn, drawn + 1.0f, 0.0f, 0.72f, IM_COL32(236, 200, 120, 160));

@@ -21,6 +21,7 @@ namespace cumulet::demo {
 namespace {
 
 constexpr float font_size = 15.0f;
+constexpr float title_size = 36.0f;
 constexpr float tip_delay = 0.5f;
 
 ImU32 color_of(ImGuiCol index, float alpha = 1.0f) { return ImGui::GetColorU32(index, alpha); }
@@ -62,6 +63,16 @@ std::string short_bytes(double bytes) {
   return in_words(bytes, units.data(), units.size(), " ");
 }
 
+std::string plain_format(const std::string& format, double value) {
+  constexpr double least = 1e4;
+  constexpr double most = 1e12;
+  const double size = std::abs(value);
+  const std::size_t begin = format.find('%');
+  const std::size_t end = begin == std::string::npos ? begin : format.find_first_not_of("%.0123456789", begin);
+  if (end == std::string::npos || format[end] != 'g' || !(size >= least && size < most)) return format;
+  return format.substr(0, begin) + "%.0f" + format.substr(end + 1);
+}
+
 void Ui::begin(float scale, double time) {
   scale_ = scale;
   time_ = time;
@@ -76,6 +87,15 @@ std::optional<Rectangle> Ui::find(const std::string& label) const {
   const auto control = last_.find(label);
   if (control == last_.end() || !control->second.in_view) return std::nullopt;
   return control->second.rectangle;
+}
+
+void Ui::place_tip_beside(const ImGuiWindow& dialog, float y) const {
+  const ImVec2 end(dialog.Pos.x + dialog.Size.x, dialog.Pos.y + dialog.Size.y);
+  const ImVec2 screen = ImGui::GetIO().DisplaySize;
+  if (end.x + px(200.0f) < screen.x)
+    ImGui::SetNextWindowPos({end.x + px(4.0f), y});
+  else if (end.y + px(60.0f) < screen.y)
+    ImGui::SetNextWindowPos({dialog.Pos.x, end.y + px(4.0f)});
 }
 
 void Ui::remember(const char* label, const char* tip) {
@@ -98,10 +118,12 @@ void Ui::remember(const char* label, const char* tip) {
     hovered_since_ = time_;
   }
   if (time_ - hovered_since_ < static_cast<double>(tip_delay) || ImGui::IsItemActive()) return;
-  // Beside the panel, so that it does not cover the next rows.
+  // Beside the panel or the dialog, so that it does not cover the next rows.
   const ImGuiWindow& root = *ImGui::GetCurrentWindow()->RootWindow;
   if (&root == ImGui::FindWindowByName(panel_name))
     ImGui::SetNextWindowPos({root.Pos.x - px(8.0f), least.y}, ImGuiCond_Always, {1.0f, 0.0f});
+  else if ((root.Flags & ImGuiWindowFlags_Modal) != 0)
+    place_tip_beside(root, least.y);
   ImGui::BeginTooltip();
   ImGui::PushTextWrapPos(px(300.0f));
   ImGui::TextUnformatted(tip);
@@ -200,10 +222,41 @@ Number Ui::within_limits(const char* label, bool typing, Number number, Number l
   return limit;
 }
 
+/// Draws the frame of a slider, filled from the left up to a value. ImGui's grab would cover digits of the value.
+template <class Number>
+void Ui::draw_fill(ImVec2 corner, ImVec2 end, ImGuiDataType type, Number value, Number least, Number most,
+                   const char* format, ImGuiSliderFlags flags, bool lit, bool held) const {
+  // An id that is never active: only the place of the grab is computed.
+  ImRect grab;
+  ImGuiLastItemData& last = ImGui::GetCurrentContext()->LastItemData;
+  const ImGuiItemFlags kept = std::exchange(last.InFlags, 0);  // ImGui looks at the item before, which may be disabled
+  ImGui::SliderBehavior({corner, end}, ImGui::GetID("fill"), type, &value, &least, &most, format, flags, &grab);
+  last.InFlags = kept;
+  constexpr float padding = 2.0f;  // ImGui's, around the grab
+  const float usable = std::max(end.x - corner.x - 2.0f * padding - grab.GetWidth(), 1.0f);
+  const float part = std::clamp((grab.Min.x - corner.x - padding) / usable, 0.0f, 1.0f);
+  const float x = corner.x + part * (end.x - corner.x);
+  ImDrawList& draw = *ImGui::GetWindowDrawList();
+  const float rounding = ImGui::GetStyle().FrameRounding;
+  draw.AddRectFilled(corner, end,
+                     color_of(held  ? ImGuiCol_FrameBgActive
+                              : lit ? ImGuiCol_FrameBgHovered
+                                    : ImGuiCol_FrameBg),
+                     rounding);
+  draw.PushClipRect(corner, {x, end.y}, true);
+  draw.AddRectFilled(corner, end, color_of(ImGuiCol_SliderGrab, 0.55f), rounding);
+  draw.PopClipRect();
+  const float edge = std::clamp(x, corner.x + px(1.0f), end.x - px(1.0f));
+  draw.AddRectFilled({edge - px(1.0f), corner.y + px(2.0f)}, {edge + px(1.0f), end.y - px(2.0f)},
+                     color_of(lit || held ? ImGuiCol_CheckMark : ImGuiCol_SliderGrabActive));
+}
+
 template <class Number>
 bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
-               const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
+               const char* given_format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed) {
   constexpr float fine = 0.1f;  // speed of a drag with Shift
+  const std::string shown_format = plain_format(given_format, static_cast<double>(value));
+  const char* const format = shown_format.c_str();
   begin_row(label);
   const std::string id = std::string("##") + label;
   const bool typing = ImGui::TempInputIsActive(ImGui::GetID(id.c_str()));
@@ -225,7 +278,15 @@ bool Ui::slide(const char* label, const char* tip, ImGuiDataType type, Number& v
       pressed_->pointer += swap.io.MouseDelta.x * (swap.io.KeyShift ? fine : 1.0f);
       swap.io.MousePos.x = pressed_->pointer;
     }
+    const bool bare = !typing && !again;
+    if (bare) {
+      draw_fill(corner, end, type, edited, least, most, format, flags, over, dragged);
+      for (const ImGuiCol color : {ImGuiCol_FrameBg, ImGuiCol_FrameBgHovered, ImGuiCol_FrameBgActive,
+                                   ImGuiCol_SliderGrab, ImGuiCol_SliderGrabActive})
+        ImGui::PushStyleColor(color, 0U);
+    }
     changed = ImGui::SliderScalar(id.c_str(), type, &edited, &least, &most, format, flags);
+    if (bare) ImGui::PopStyleColor(5);
   }
   if (over && !typing && !again && ImGui::IsMouseClicked(ImGuiMouseButton_Left))
     pressed_ = Pressed{label, static_cast<double>(value),
@@ -287,7 +348,7 @@ bool Ui::numbers(const char* label, const char* tip, std::span<double> values, f
     PointerSwap swap;
     swap.io.KeyAlt = std::exchange(swap.io.KeyShift, false);
     changed = ImGui::DragScalarN((std::string("##") + label).c_str(), ImGuiDataType_Double, edited.data(),
-                                 static_cast<int>(edited.size()), speed, nullptr, nullptr, "%.4g");
+                                 static_cast<int>(edited.size()), speed, nullptr, nullptr, "%.5g");
   }
   remember(label, tip);
   if (!changed || !std::ranges::all_of(edited, [](double one) { return std::isfinite(one); })) return false;
@@ -297,7 +358,10 @@ bool Ui::numbers(const char* label, const char* tip, std::span<double> values, f
 
 bool Ui::entry(const std::string& text, std::size_t index, bool chosen, ImGuiSelectableFlags flags) {
   const ImVec2 corner = ImGui::GetCursorScreenPos();
+  // The chosen entry keeps its color below the pointer.
+  if (chosen) ImGui::PushStyleColor(ImGuiCol_HeaderHovered, ImGui::GetStyleColorVec4(ImGuiCol_Header));
   const bool clicked = ImGui::Selectable(("##" + std::to_string(index)).c_str(), chosen, flags);
+  if (chosen) ImGui::PopStyleColor();
   ImGui::GetWindowDrawList()->AddText(corner, ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
   return clicked;
 }
@@ -645,7 +709,7 @@ void apply_theme(float scale) {
   set(ImGuiCol_ButtonActive, 0x4C5766);
   set(ImGuiCol_MenuBarBg, 0x23272D);
   set(ImGuiCol_Tab, 0x23272D);
-  set(ImGuiCol_TabHovered, 0x3A424E);
+  set(ImGuiCol_TabHovered, 0x46698E);
   set(ImGuiCol_TabActive, 0x3D5F82);
   set(ImGuiCol_TabUnfocused, 0x23272D);
   set(ImGuiCol_TabUnfocusedActive, 0x3D5F82);
@@ -677,12 +741,17 @@ void load_fonts(float scale) {
     ImFontConfig config;
     config.OversampleH = scale < 1.5f ? 2 : 1;
     config.OversampleV = 1;
-    if (fonts.AddFontFromFileTTF(path.c_str(), std::round(font_size * scale), &config, glyphs.data()) != nullptr)
-      return;
+    if (fonts.AddFontFromFileTTF(path.c_str(), std::round(font_size * scale), &config, glyphs.data()) == nullptr)
+      continue;
+    static constexpr std::array<ImWchar, 3> letters = {0x0020, 0x007E, 0};
+    fonts.AddFontFromFileTTF(path.c_str(), std::round(title_size * scale), &config, letters.data());
+    return;
   }
   ImFontConfig config;
   config.SizePixels = 13.0f * std::max(1.0f, std::round(scale));
   fonts.AddFontDefault(&config);
 }
+
+ImFont* title_font() { return ImGui::GetIO().Fonts->Fonts.back(); }
 
 }  // namespace cumulet::demo

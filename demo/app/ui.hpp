@@ -16,6 +16,8 @@
 #include "ramp_edit.hpp"
 #include "replay.hpp"
 
+struct ImGuiWindow;
+
 namespace cumulet::demo {
 
 /// Name of the panel's window.
@@ -115,6 +117,8 @@ class Ui {
 
  private:
   void begin_row(const char* label) const;
+  // Places the next tooltip beside or below a dialog, if there is room.
+  void place_tip_beside(const ImGuiWindow& dialog, float y) const;
   void draw_dial(ImVec2 centre, float radius, bool lit, float azimuth, float elevation, float camera_azimuth) const;
   struct CurveArea;
   // near: index of the point under the mouse.
@@ -128,8 +132,11 @@ class Ui {
   Number within_limits(const char* label, bool typing, Number number, Number least, Number most,
                        const std::optional<settings::Range>& typed);
   template <class Number>
+  void draw_fill(ImVec2 corner, ImVec2 end, ImGuiDataType type, Number value, Number least, Number most,
+                 const char* format, ImGuiSliderFlags flags, bool lit, bool held) const;
+  template <class Number>
   bool slide(const char* label, const char* tip, ImGuiDataType type, Number& value, Number least, Number most,
-             const char* format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed);
+             const char* given_format, ImGuiSliderFlags flags, const std::optional<settings::Range>& typed);
 
   // The slider that was pressed last.
   struct Pressed {
@@ -164,6 +171,12 @@ class Ui {
 /// Sets a dark theme and loads fonts for the scale: the system's DejaVu Sans if it exists, else ImGui's default font.
 void apply_theme(float scale);
 void load_fonts(float scale);
+/// Returns the font of the program's name.
+[[nodiscard]] ImFont* title_font();
+
+/// Returns a format of printf in which %g does not write this number with an exponent, unless it is very large or
+/// small.
+[[nodiscard]] std::string plain_format(const std::string& format, double value);
 
 /// Formats numbers with three digits: "1.24 M", "12.3 MB".
 [[nodiscard]] std::string short_count(double count);

@@ -142,4 +142,16 @@ void App::autosave() {
   }
 }
 
+void App::keep_or_remove_recovery() {
+  if (ending_.quit || !model_.modified) {
+    changes_->recovery().remove();
+    return;
+  }
+  try {
+    changes_->recovery().write(model_.scene, model_.scene_path);
+  } catch (const std::exception& error) {
+    std::cerr << "cumulet-demo: " << one_line(error.what()) << std::endl;
+  }
+}
+
 }  // namespace cumulet::demo

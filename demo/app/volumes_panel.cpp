@@ -86,14 +86,4 @@ void Panel::one_model(SceneModel& one) {
   if (const auto moved = stand_at(transform)) one.to_world = *moved;
 }
 
-void Panel::other_medium(SceneVolume& other) {
-  using Desc = cumulet_medium_desc;
-  settings::for_each<Desc>([&](auto setting) {
-    if (!setting.is(&Desc::density_scale) && !setting.is(&Desc::coalbedo)) return;
-    if (setting.is(&Desc::density_scale) && other.auto_density_scale) setting.row.zero = "auto";
-    if (rows_.draw(setting, other.medium.*setting.field) && setting.is(&Desc::density_scale))
-      other.auto_density_scale = false;
-  });
-}
-
 }  // namespace cumulet::demo

@@ -13,16 +13,6 @@
 namespace cumulet::demo {
 namespace {
 
-/// Returns the scene's medium. If the scene does not set the density scale, it is taken from the volume, or the whole
-/// medium is that of a fire.
-cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) {
-  cumulet_medium_desc medium = scene.medium;
-  if (!scene.auto_density_scale || medium.density_scale > 0.0) return medium;
-  if (open.fire && is_unsaid(medium)) return *open.fire;
-  medium.density_scale = open.density_scale;
-  return medium;
-}
-
 bool same_instance(const cumulet_instance_desc& a, const cumulet_instance_desc& b) {
   const auto same = [](const double(&one)[16], const double(&other)[16]) { return std::ranges::equal(one, other); };
   return same(a.to_world, b.to_world) && same(a.open_to_world, b.open_to_world) &&
@@ -30,6 +20,14 @@ bool same_instance(const cumulet_instance_desc& a, const cumulet_instance_desc& 
 }
 
 }  // namespace
+
+cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) {
+  cumulet_medium_desc medium = scene.medium;
+  if (!scene.auto_density_scale || medium.density_scale > 0.0) return medium;
+  if (open.fire && is_unsaid(medium)) return *open.fire;
+  medium.density_scale = open.density_scale;
+  return medium;
+}
 
 OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
   OpenVolume open{std::move(volume), std::nullopt, 0.0, std::nullopt};
@@ -39,7 +37,8 @@ OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
   return open;
 }
 
-OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user) {
+OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user,
+                       const std::function<void(const cumulet_volume&)>& see) {
   if (auto row = FrameRow::of_name(file.volume)) {
     if (const std::string line = row->pattern().passed_over(); log != nullptr && !line.empty())
       log(log_user, CUMULET_LOG_WARNING, line.c_str());
@@ -48,7 +47,7 @@ OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_use
       VolumeFile frame = file;
       frame.volume = name;
       try {
-        OpenVolume open = open_volume(frame, nullptr, nullptr);
+        OpenVolume open = open_volume(frame, nullptr, nullptr, see);
         open.volume.reset();
         open.row = std::move(row);
         return open;
@@ -63,7 +62,9 @@ OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_use
   desc.log_user = log_user;
   cumulet_volume* opened = nullptr;
   check_call(cumulet_volume_open_file(&desc, &opened, nullptr, 0));
-  return look_into({opened, cumulet_volume_release});
+  const std::shared_ptr<cumulet_volume> volume(opened, cumulet_volume_release);
+  if (see) see(*volume);
+  return look_into(volume);
 }
 
 std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& files,

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <frame_row.hpp>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <scene_file.hpp>
@@ -26,7 +27,12 @@ struct OpenVolume {
 /// Opens a file, or the first readable frame of a sequence, in any thread. Logs the notes and warnings of a file, and
 /// the files that a sequence passes over; frames log when they are played. Throws std::runtime_error with the library's
 /// cause.
-[[nodiscard]] OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user);
+/// see: called with the volume that the settings are derived from.
+[[nodiscard]] OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user,
+                                     const std::function<void(const cumulet_volume&)>& see = {});
+/// Returns the medium that a volume is shown with: the scene's. If the scene does not set the density scale, it is
+/// taken from the volume, or the whole medium is that of a fire.
+[[nodiscard]] cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open);
 /// Creates a sequence with one file per frame. `file`: how all files are read; its path is ignored. memory_bytes: 0 is
 /// the library's default. Reads nothing yet. Throws std::runtime_error with the library's error text.
 [[nodiscard]] std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& files,

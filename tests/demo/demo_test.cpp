@@ -468,6 +468,13 @@ TEST(DemoModel, SceneTitleNamesItsContent) {
   Model model;
   model.scene.surfaces = "/a/town.glb";
   EXPECT_TRUE(suggest_path(model, ".png").ends_with("town-001.png")) << suggest_path(model, ".png");
+  // A file's name is not that of a sequence.
+  model.scene.volume = "/a/fluid_data_####.vdb";
+  EXPECT_TRUE(suggest_path(model, ".json").ends_with("/fluid_data-001.json") ||
+              suggest_path(model, ".json") == "fluid_data-001.json")
+      << suggest_path(model, ".json");
+  model.scene.volume = "/a/####.vdb";
+  EXPECT_TRUE(suggest_path(model, ".json").ends_with("cumulet-001.json")) << suggest_path(model, ".json");
 }
 
 TEST(DemoModel, TypingDoesNotTriggerShortcuts) {

@@ -71,6 +71,38 @@ TEST_P(PanelDialogTest, DialogIsTheDesktopsOrElseTheOwn) {
   EXPECT_TRUE(commands_.empty());
 }
 
+TEST_P(PanelDialogTest, TypedNamesAreInTheShownFolder) {
+  const cumulet::test::Folder folder;
+  std::filesystem::create_directory(folder / "shots");
+  const auto type = [&](const char* text) {
+    for (int i = 0; i < 3; ++i) frame();  // the field has the focus, and its text is selected
+    ImGui::GetIO().AddInputCharactersUTF8(text);
+    for (int i = 0; i < 2; ++i) frame();
+  };
+  const auto press = [&](const char* button) {
+    panel_.ui().bring_into_view(button);
+    for (int i = 0; i < 3; ++i) frame();
+    click(button);
+  };
+  panel_.dialog().open("Save scene", Action::save_scene_as, {".json"}, (folder / "shots/cloud-001.json").string());
+  type("evening");
+  press("Save file");
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_EQ(commands_[0].text, (folder / "shots/evening.json").string());
+  std::ofstream(folder / "shots/a.json") << "x";
+  panel_.dialog().open("Open", Action::open, {".json"}, (folder / "shots").string());
+  for (int i = 0; i < 3; ++i) frame();
+  click("Open file");
+  EXPECT_EQ(commands_.size(), 1u) << "nothing is chosen";
+  ImGui::GetIO().AddInputCharactersUTF8("../shots/a.json");
+  for (int i = 0; i < 2; ++i) frame();
+  panel_.ui().bring_into_view("Path");
+  frame();
+  press("Open file");
+  ASSERT_EQ(commands_.size(), 2u);
+  EXPECT_EQ(commands_[1].text, (folder / "shots/a.json").string());
+}
+
 TEST_P(PanelDialogTest, MessagesHaveTheirButtons) {
   show_message(model_, false, "a.vdb: Z is up", 1.0, MessageButton{"Y up", "Stands it on Y.", {Action::choose_up}});
   for (int i = 0; i < 3; ++i) frame();

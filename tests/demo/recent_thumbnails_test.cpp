@@ -1,6 +1,7 @@
 // Thumbnails of recent files, made by a program in place of cumulet-render.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <filesystem>
@@ -31,8 +32,9 @@ class RecentThumbnailsTest : public testing::Test {
     return path;
   }
   static void finish(RecentThumbnails& thumbnails, const std::vector<std::string>& files) {
+    double now = 0.0;
     do {
-      thumbnails.follow(files);
+      thumbnails.follow(files, now += 10.0);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     } while (thumbnails.works());
   }
@@ -90,12 +92,37 @@ TEST_F(RecentThumbnailsTest, AFailureIsNotRepeatedForTheSameContent) {
 TEST_F(RecentThumbnailsTest, StoppingEndsTheProgramAndLeavesNothing) {
   RecentThumbnails thumbnails(script("echo part >\"$4\"; exec sleep 60"), cache_);
   const std::vector<std::string> files = {file("a.vdb")};
-  thumbnails.follow(files);
+  thumbnails.follow(files, 0.0);
   while (fs::is_empty(cache_)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_TRUE(thumbnails.works());
   thumbnails.stop();
   EXPECT_FALSE(thumbnails.works());
   EXPECT_TRUE(fs::is_empty(cache_));
+}
+
+TEST_F(RecentThumbnailsTest, FilesAreLookedAtOncePerSecond) {
+  RecentThumbnails thumbnails(script("cat \"$5\" >\"$4\""), cache_);
+  const std::vector<std::string> files = {file("a.vdb")};
+  finish(thumbnails, files);
+  EXPECT_TRUE(thumbnails.follow(files, 1000.0));
+  fs::remove(thumbnails.find(files[0]));
+  EXPECT_FALSE(thumbnails.follow(files, 1000.5)) << "nothing is read in most frames";
+  EXPECT_FALSE(thumbnails.works());
+  EXPECT_TRUE(thumbnails.follow(std::vector<std::string>(), 1000.6)) << "another list";
+  EXPECT_TRUE(thumbnails.follow(files, 1002.0));
+  EXPECT_TRUE(thumbnails.works());
+}
+
+TEST_F(RecentThumbnailsTest, UnfinishedOnesOfEndedProgramsAreRemoved) {
+  fs::create_directories(cache_);
+  const std::string left = file("cache/thumbnails/0123456789abcdef.png.999999999.part");
+  const std::string other = file("cache/thumbnails/0123456789abcdef.png." + std::to_string(::getpid()) + ".part");
+  const std::string done = file("cache/thumbnails/0123456789abcdef.png");
+  RecentThumbnails thumbnails(script("exit 1"), cache_);
+  thumbnails.follow(std::vector<std::string>(), 0.0);
+  EXPECT_FALSE(fs::exists(left));
+  EXPECT_TRUE(fs::exists(other)) << "its program runs";
+  EXPECT_TRUE(fs::exists(done));
 }
 
 TEST_F(RecentThumbnailsTest, WithoutProgramOrFolderThereAreNone) {

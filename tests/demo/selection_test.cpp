@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+
 #include <string>
 #include <utility>
 #include <vector>
@@ -136,15 +141,49 @@ TEST(Selection, ChangesOfTheOrderAreNamed) {
 }
 
 TEST(Selection, ANewLightSuitsTheExposure) {
-  const auto power = [](float stops) {
+  const auto light_at = [](float stops) {
     Model model;
     model.scene.camera.eye[2] = 10.0;
     model.scene.display.exposure_stops = stops;
     add_light(model);
-    return model.scene.analytic_lights.at(0).power;
+    return model.scene.analytic_lights.at(0);
   };
-  EXPECT_NEAR(power(0.0f), 2.0 * 4.0 * 3.14159265 * 25.0, 0.01);
-  EXPECT_FLOAT_EQ(power(3.0f), power(0.0f) / 8.0f);
+  const cumulet_light_desc made = light_at(0.0f);
+  const double distance = std::hypot(made.position[0], made.position[1], made.position[2]);
+  EXPECT_NEAR(static_cast<double>(made.power), 2.0 * 4.0 * 3.14159265 * distance * distance, 0.01);
+  EXPECT_FLOAT_EQ(light_at(3.0f).power, made.power / 8.0f);
+}
+
+TEST(Selection, ANewLightIsInView) {
+  struct View {
+    std::array<double, 3> eye;
+    double fovy;
+    double orthographic_height;
+  };
+  for (const View& view : {View{{0, 0, 10}, 0, 0}, View{{300, 200, -100}, 20, 0}, View{{0, 5, 0}, 40, 0},
+                           View{{1, 2, 3}, 150, 0}, View{{10, 0, 0}, 40, 4}}) {
+    Model model;
+    cumulet_camera_desc& camera = model.scene.camera;
+    std::ranges::copy(view.eye, camera.eye);
+    camera.fovy_degrees = view.fovy;
+    camera.orthographic_height = view.orthographic_height;
+    add_light(model);
+    const auto& light = model.scene.analytic_lights.at(0);
+    const glm::dvec3 eye(view.eye[0], view.eye[1], view.eye[2]);
+    const glm::dvec3 forward = -glm::normalize(eye);
+    const glm::dvec3 at(light.position[0], light.position[1], light.position[2]);
+    const double depth = glm::dot(at - eye, forward);
+    const double side = glm::length(at - eye - depth * forward);
+    const double fovy = view.fovy > 0.0 ? view.fovy : 40.0;
+    const double half =
+        view.orthographic_height > 0.0 ? 0.5 * view.orthographic_height : depth * std::tan(fovy * 3.14159265 / 360.0);
+    EXPECT_GT(depth, 0.0);
+    EXPECT_LT(side, half) << "outside of a square image";
+    EXPECT_GT(side, 0.3 * std::min(half, glm::length(eye))) << "on the way to the target";
+    // It shines at the target.
+    const glm::dvec3 direction(light.direction[0], light.direction[1], light.direction[2]);
+    EXPECT_NEAR(glm::dot(direction, glm::normalize(at)), -1.0, 1e-9);
+  }
 }
 
 }  // namespace

@@ -152,8 +152,8 @@ def test_alone(s):
     session_light.write_environment(s.out / "sky.hdr", lambda x: x < 8)
     for name, file in (("model", mountains), ("environment", s.out / "sky.hdr")):
         s.play(name, ["frames 5", *shot(f"{name}_empty"), f'drop "{file}"', "frames 3", "wait loaded", "wait converged", "key escape",
-                      "frames 2", *shot(name), *save_as("ctrl+f12", f"{name}_saved.png"), "frames 3", "key escape", "key escape",
-                      *save_as("shift+f12", f"{name}_saved.exr"), "frames 3", "wait converged", *shot(f"{name}_end")], "--spp", "2")
+                      "frames 2", *shot(name), *save_as("ctrl+f12", f"{s.out}/{name}_saved.png"), "frames 3", "key escape", "key escape",
+                      *save_as("shift+f12", f"{s.out}/{name}_saved.exr"), "frames 3", "wait converged", *shot(f"{name}_end")], "--spp", "2")
         empty, report, end = s.report(f"{name}_empty"), s.report(name), s.report(f"{name}_end")
         assert not empty["has_content"] and empty["title"] == "Cumulet" and empty["state"] == "", empty
         assert report["has_content"] and report["title"] == f"{file.name} - Cumulet", report["title"]
@@ -177,7 +177,7 @@ def test_dropped_together(s):
                        f'drop "{s.out}/blast_3.vdb" "{s.out}/blast_1.vdb"', *there, 'report "plays.json"', "key escape",
                        'click "Playhead" 0.05 0.5', "frames 3", "key .", *there, *shot("frames"),
                        *tab("Grids"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', *there, "key ctrl+s", "frames 2", "key ctrl+a",
-                       'text "saved.json"', "key enter", *there, *shot("saved")],
+                       f'text "{s.out}/saved.json"', "key enter", *there, *shot("saved")],
            "--spp", "1")
     several, frames = s.report("several"), s.report("frames")
     assert [pathlib.Path(volume["file"]).name for volume in several["volumes"]] == ["cumulus.vdb", "explosion_0012.vdb"], several
@@ -194,12 +194,12 @@ def test_save_whole(s):
     """Saving during a preview saves the first full-resolution image after it. The status line says so meanwhile."""
     # The view changes right before the dialog opens, and no samples are traced while the dialog is open.
     view = lambda x: ["move viewport 0.3 0.5", "down left", f"move viewport {x} 0.5", "up left"]
-    s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("ctrl+f12", "early.png"), 'report "early.json"', "frames 1",
+    s.play("replay", ["wait loaded", "frames 10", *view(0.4), *save_as("ctrl+f12", f"{s.out}/early.png"), 'report "early.json"', "frames 1",
                       "wait converged", "key escape", "frames 2", *shot("rest"),
-                      *view(0.5), *save_as("shift+f12", "early.exr"), "wait converged", "frames 2", 'report "exr.json"',
-                      "key n", *save_as("shift+f12", "wide.exr"), "wait converged", "frames 2", *shot("wide"),
-                      "key t", "frames 3", *save_as("ctrl+f12", "turning.png"), "frames 300", 'report "turning.json"', "key t",
-                      *view(0.4), *save_as("ctrl+f12", "never.png"), *["key escape"] * 4, "wait converged", "frames 3", 'report "end.json"'],
+                      *view(0.5), *save_as("shift+f12", f"{s.out}/early.exr"), "wait converged", "frames 2", 'report "exr.json"',
+                      "key n", *save_as("shift+f12", f"{s.out}/wide.exr"), "wait converged", "frames 2", *shot("wide"),
+                      "key t", "frames 3", *save_as("ctrl+f12", f"{s.out}/turning.png"), "frames 300", 'report "turning.json"', "key t",
+                      *view(0.4), *save_as("ctrl+f12", f"{s.out}/never.png"), *["key escape"] * 4, "wait converged", "frames 3", 'report "end.json"'],
            "--volume", s.cumulus, "--spp", "1", size=["--size", "760x240"])
     early = s.report("early")
     assert early["preview"] and early["picture"] != early["viewport"][2:], "it was a whole picture already"
@@ -223,9 +223,9 @@ def test_scene_file(s):
     view = [*shown("Camera"), 'click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
             "frames 3", 'click "Saved camera"', "frames 2", 'click "Saved camera/near"', "frames 3"]
     s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
-                    *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
+                    *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/scene.json"', "key enter", "frames 3",
                     "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key ctrl+f12", "frames 2",
-                    "key ctrl+a", 'text "picture.png"', "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", 'text "picture.exr"', "key enter",
+                    "key ctrl+a", f'text "{s.out}/picture.png"', "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", f'text "{s.out}/picture.exr"', "key enter",
                     "frames 3", *shot("messages")],
            "--volume", s.cumulus)
     assert [m for m in s.report("messages")["messages"] if m["error"]] == []
@@ -241,7 +241,7 @@ def test_scene_file(s):
     subprocess.run([s.renderer, "--scene", "scene.json", "-o", "rendered.png"], cwd=s.out, check=True)
     assert_saved(saved, s.picture("rendered"), area)
     s.play("open", ["wait loaded", f'drop "{s.out}/scene.json"', "wait loaded", "wait converged", "key escape", "frames 2",
-                    *shot("opened"), "key ctrl+shift+s", "frames 2", "key ctrl+a", 'text "again.json"', "key enter", "frames 3",
+                    *shot("opened"), "key ctrl+shift+s", "frames 2", "key ctrl+a", f'text "{s.out}/again.json"', "key enter", "frames 3",
                     "key ctrl+z", "wait loaded", *shot("back")], "--volume", s.explosion)
     assert_alike(saved, look(s, "opened")[0], area)
     assert s.report("opened")["volumes"][0]["medium"] == medium

@@ -170,7 +170,7 @@ def test_timeline(s):
             "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Repeat"', "frames 2",
             'click "Repeat/Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
             'click "Playhead" 0.99 0.5', "key escape", "key escape", *there, *shot("scrubbed"), "key ctrl+s", "frames 2", "key ctrl+a",
-            'text "played.json"', "key enter", "frames 3",
+            f'text "{s.out}/played.json"', "key enter", "frames 3",
             'click "Playhead" 0.01 0.5', *there, "key space", "frames 12", "key space", *there, 'report "again.json"'],
            "fire_05.vdb", *quick, size=size)
     alone, opened, following, missing = (s.report(name) for name in ("alone", "opened", "next", "missing"))
@@ -216,7 +216,7 @@ def test_timeline(s):
     mountains = pathlib.Path(s.cumulus).with_name("mountains.glb")
     s.play("kept", [*there, 'drop "cut.vdb"', *there, 'report "cut.json"', 'drop "cut_#.vdb"', *there, 'report "all.json"',
                     *(["key .", "frames 3"] * 5), *there,
-                    "key ctrl+s", "frames 2", "key ctrl+a", 'text "beside.json"', "key enter", "frames 3",
+                    "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/beside.json"', "key enter", "frames 3",
                     "key space", "frames 3", 'report "begun.json"'],
            "fire_##.vdb", "--gltf", str(mountains), "--spp", "1", size=size)
     for name, cause in (("cut", "cut.vdb"), ("all", "cut_1.vdb")):
@@ -255,7 +255,7 @@ def test_negative_frames(s):
         shutil.copy(s.explosion if number < 0 else s.cumulus, s.out / f"fire.{'%04d' % number}.vdb")
     there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
     s.play("replay", [*there, *shot("first"), "key .", *there, "key i", "key .", *there, *shot("third"), "key ctrl+s", "frames 2",
-                      "key ctrl+a", 'text "played.json"', "key enter", "frames 3"],
+                      "key ctrl+a", f'text "{s.out}/played.json"', "key enter", "frames 3"],
            "fire.####.vdb", "--spp", "1", "--max-bounces", "2", size=["--size", "640x260"])
     first, third = s.report("first")["sequence"], s.report("third")["sequence"]
     assert first["first"] == -2 and first["count"] == 4 and first["frame"] == first["drawn"] == -2, first
@@ -330,7 +330,7 @@ def test_unnamed_grids(s):
 def test_up_axis(s):
     """The up axis is selected, displayed, saved and undone; cumulet-render shows the same image."""
     s.play("replay", ["wait loaded", "wait converged", *shot("y"), *tab("Grids"), 'click "Up axis"', "frames 2", 'click "Up axis/Z"', "frames 3",
-                      "move viewport 0.5 0.5", "wait loaded", "wait converged", *shot("z"), "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"',
+                      "move viewport 0.5 0.5", "wait loaded", "wait converged", *shot("z"), "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/scene.json"',
                       "key enter", "frames 3", "key escape", "frames 2", "key ctrl+z", "frames 3", "wait loaded",
                       "wait converged", *shot("back")],
            "--volume", s.explosion)

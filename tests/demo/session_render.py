@@ -39,19 +39,19 @@ def test_render(s):
     """F12 renders a picture in the background, while the window stays usable."""
     file_manager(s)
     s.play("replay",
-           ["wait loaded", "wait converged", "key ctrl+s", "frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3",
-            "key f12", "frames 3", *shot("dialog"), *SMALL, *choose("Denoising", "Off"), *enter("Picture file", "one.png"), *shot("started"),
+           ["wait loaded", "wait converged", "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/scene.json"', "key enter", "frames 3",
+            "key f12", "frames 3", *shot("dialog"), *SMALL, *choose("Denoising", "Off"), *enter("Picture file", f"{s.out}/one.png"), *shot("started"),
             "drag viewport 0.3 0.5 to viewport 0.5 0.5", "frames 3", *shot("moved"), "wait rendered", "frames 3", *shot("done"),
             'click "Render 1/Show in folder"', "frames 3",
             "key f12", "frames 3", *choose("Format", "EXR"), 'click "Layer/normal"', "frames 2", *choose("Denoising", "Fast"),
-            *enter("Picture file", "two.exr"), "wait rendered", "frames 3",
-            "key f12", "frames 3", *choose("Format", "WebP"), *enter("Picture file", "three"), "wait rendered", "frames 3",
+            *enter("Picture file", f"{s.out}/two.exr"), "wait rendered", "frames 3",
+            "key f12", "frames 3", *choose("Format", "WebP"), *enter("Picture file", f"{s.out}/three"), "wait rendered", "frames 3",
             # A picture that takes long is canceled, and a wrong path is refused.
-            "key f12", "frames 3", *enter("Max samples", "60000"), *enter("Picture file", "never.webp"), "frames 20", *shot("runs"),
+            "key f12", "frames 3", *enter("Max samples", "60000"), *enter("Picture file", f"{s.out}/never.webp"), "frames 20", *shot("runs"),
             'click "Render 4/Cancel"', "wait rendered", "frames 3",
             "key f12", "frames 3", *enter("Picture file", "/proc/nowhere/a.webp"), *shot("refused"), "key escape", "key escape", "frames 3",
             *shot("end"),
-            "key f12", "frames 3", *enter("Max samples", "60000"), *enter("Picture file", "never.webp"), "frames 10",
+            "key f12", "frames 3", *enter("Max samples", "60000"), *enter("Picture file", f"{s.out}/never.webp"), "frames 10",
             "key ctrl+q", "frames 3", *shot("asked"), 'click "Question/Quit anyway"', "frames 30", 'screenshot "never.png"'],
            "--volume", s.cumulus, "--spp", "4", "--shader-cache", "shaders", size=["--size", "900x600"])
     report = s.report
@@ -87,7 +87,7 @@ def test_walk(s):
             'click "Scene/Sun & sky"', "frames 2", 'drag "Time of day" 0.7 0.5 to "Time of day" 0.905 0.5', "frames 3", "wait converged", "frames 30", *shot("sunset"),
             'click "Add light"', "frames 3", *shot("lit"),
             "key f12", "frames 3", *shot("dialog"), *choose("Resolution", "Full HD 1920x1080"),
-            *enter("Max samples", "2"), *enter("Picture file", "walk.png"), "wait rendered", "frames 3", *shot("saved")]
+            *enter("Max samples", "2"), *enter("Picture file", f"{s.out}/walk.png"), "wait rendered", "frames 3", *shot("saved")]
     s.play("replay", hand, "--spp", "2", "--denoise", "fast", "--shader-cache", "shaders", size=["--size", "1440x900"], auto_exposure=True)
     picture = s.picture("walk")
     assert [picture.width, picture.height] == [1920, 1080]
@@ -109,10 +109,10 @@ def test_render_sequence(s):
         shutil.copy(s.explosion if number % 2 else s.cumulus, s.out / f"fire_{number}.vdb")
     (s.out / "fire_4.vdb").write_bytes(b"no volume")
     there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
-    s.play("replay", [*there, "key f12", "frames 3", *SMALL, 'click "Sequence"', "frames 2", *shot("dialog"), *enter("Picture file", "out_##.png"),
+    s.play("replay", [*there, "key f12", "frames 3", *SMALL, 'click "Sequence"', "frames 2", *shot("dialog"), *enter("Picture file", f"{s.out}/out_##.png"),
                       "key .", *there, "wait rendered", "frames 3", *shot("done"),
                       "key f12", "frames 3", *enter("Max samples", "4"), 'click "Sequence"', "frames 2",
-                      *enter("Picture file", "single.png"), "wait rendered", "frames 3",
+                      *enter("Picture file", f"{s.out}/single.png"), "wait rendered", "frames 3",
                       *shot("still")],
            "fire_#.vdb", "--spp", "1", "--max-bounces", "2", "--shader-cache", "shaders", size=["--size", "900x600"])
     (entry,) = s.report("done")["renders"]

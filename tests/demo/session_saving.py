@@ -8,7 +8,10 @@ import time
 
 from demo_session import SIZE, shot, shown
 
-SAVE_AS = ["frames 2", "key ctrl+a", 'text "scene.json"', "key enter", "frames 3"]
+def save_as(s):
+    """Types a name into the open dialog."""
+    return ["frames 2", "key ctrl+a", f'text "{s.out}/scene.json"', "key enter", "frames 3"]
+
 
 
 def scene(name, cumulus):
@@ -27,7 +30,7 @@ def test_unsaved(s):
             "close", "frames 2", *shot("asked"), 'click "Question/Cancel"', "frames 3", *shot("stayed"),
             # A dialog that is closed without saving keeps the window open.
             "close", "frames 2", "key enter", "frames 3", *shot("dialog"), "key escape", "frames 3", *shot("not_saved"),
-            "key ctrl+s", *SAVE_AS, *shot("saved"),
+            "key ctrl+s", *save_as(s), *shot("saved"),
             "key ]", "frames 3", f'drop "{s.out}/other.json"', "frames 2", *shot("opening"), "key escape", "frames 3", *shot("kept"),
             f'drop "{s.out}/other.json"', "frames 2", 'click "Question/Discard"', *there, *shot("opened"),
             "key ]", "frames 3", "key ctrl+n", "frames 2", 'click "Question/Discard"', *there, *shot("new"),
@@ -74,6 +77,32 @@ def killed(s, name, *arguments):
         demo.send_signal(signal.SIGKILL)
         demo.wait()
     return copy
+
+
+def test_ended(s):
+    """A signal, such as that of the desktop's logout, ends the program without a loss: the recent files and the unsaved
+    changes are kept, and no unfinished file."""
+    (s.out / "ended.replay").write_text("\n".join(["frames 3", "wait loaded", "frames 3", "key ]", "frames 9", 'report "live.json"', "idle 60"]))
+    demo = subprocess.Popen([s.demo, *SIZE, "--spp", "1", s.cumulus, "--replay", "ended.replay"], cwd=s.out, env=s.environment)
+    try:
+        while not (s.out / "live.json").exists():
+            assert demo.poll() is None
+            time.sleep(0.05)
+        config = s.out / "config/cumulet/demo.json"
+        assert json.loads(config.read_text())["recent"] == [s.cumulus], "a crash keeps the recent files"
+        config.unlink()
+        began = time.monotonic()
+        demo.send_signal(signal.SIGTERM)
+        assert demo.wait(timeout=120) == 0
+        assert time.monotonic() - began < 30, "it does not wait for the end of the replay"
+    finally:
+        demo.kill()
+    assert json.loads(config.read_text())["recent"] == [s.cumulus]
+    copy = s.out / "state/cumulet/recovery-1.json"
+    assert json.loads(copy.read_text())["display"]["exposure_stops"] > 0.3
+    s.play("next", ["frames 3", *shot("asked"), 'click "Question/Recover"', "frames 3", "wait loaded", "frames 3", *shot("recovered")])
+    assert s.report("asked")["question"] == "Recover unsaved changes"
+    assert s.report("recovered")["modified"]
 
 
 def test_recovery(s):

@@ -34,9 +34,14 @@ TEST(StatusLine, DescribesTheDisplayedImage) {
   EXPECT_EQ(status_text(model), "256 samples, denoised   100x50");
   model.status.frame.flags = CUMULET_RENDER_INCOMPLETE | CUMULET_RENDER_PREVIEW;
   model.seconds_left.reset();
-  EXPECT_EQ(status_text(model), "Preview, denoised   100x50");
+  EXPECT_EQ(status_text(model), "Preview   100x50") << "its first samples are not denoised";
   model.status.saving = "/a/b.png";
-  EXPECT_EQ(status_text(model), "Preview, denoised   saving b.png when all pixels are sampled   100x50");
+  EXPECT_EQ(status_text(model), "Preview   saving b.png when all pixels are sampled   100x50");
+  model.status.saving.clear();
+  model.status.frame.flags = CUMULET_RENDER_INCOMPLETE;
+  model.status.frame.progress = 0.0;
+  model.status.stats.samples = 4999;
+  EXPECT_EQ(status_text(model), "0 / 256   100x50") << "there is nothing to denoise";
 }
 
 TEST(StatusLine, NoiseTargetsMakeTheSamplesAMaximum) {
@@ -60,6 +65,17 @@ TEST(StatusLine, NamesOtherViews) {
   model.scene.display.denoise = CUMULET_DENOISE_FAST;
   EXPECT_EQ(status_text(model).rfind("steps", 0), 0u) << status_text(model);
   EXPECT_EQ(status_text(model).find("denoised"), std::string::npos) << "only the shaded view is denoised";
+}
+
+TEST(StatusLine, WorkIsNotThatOfAnotherFile) {
+  Model model;
+  model.scene.volume = "/a/cloud.vdb";
+  EXPECT_EQ(file_of_work(model), "/a/cloud.vdb");
+  model.status.loading = "/a/smoke.vdb";
+  EXPECT_EQ(file_of_work(model), "/a/smoke.vdb");
+  model.scene.others.emplace_back().volume = "/a/smoke.vdb";
+  model.status.loading.clear();
+  EXPECT_EQ(file_of_work(model), "") << "the grid may be that of either volume";
 }
 
 TEST(Messages, AreLoggedAndMayHaveAButton) {

@@ -1,0 +1,130 @@
+#include "placement.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <glm/gtc/matrix_transform.hpp>
+#include <string>
+#include <utility>
+
+#include "app.hpp"
+#include "selection.hpp"
+
+namespace cumulet::demo {
+namespace {
+
+using glm::dvec3;
+
+double size_of(const Box& box) { return glm::distance(box.least, box.most); }
+
+/// Returns the nearest number with one significant digit: 1, 2 or 5 times a power of ten.
+double round_scale(double scale) {
+  const double power = std::pow(10.0, std::floor(std::log10(scale)));
+  const double digits = scale / power;
+  return power * (digits < 1.5 ? 1.0 : digits < 3.5 ? 2.0 : digits < 7.5 ? 5.0 : 10.0);
+}
+
+/// Returns the distance between two boxes; 0 if they touch.
+double gap_between(const Box& a, const Box& b) {
+  return glm::length(glm::max(glm::max(a.least - b.most, b.least - a.most), dvec3(0.0)));
+}
+
+void add(std::optional<Box>& all, const Box& box, const glm::dmat4& transform) {
+  for (int corner = 0; corner < 8; ++corner) {
+    const dvec3 at((corner & 1) != 0 ? box.most.x : box.least.x, (corner & 2) != 0 ? box.most.y : box.least.y,
+                   (corner & 4) != 0 ? box.most.z : box.least.z);
+    const dvec3 moved(transform * glm::dvec4(at, 1.0));
+    if (!all) all = Box{moved, moved};
+    all->least = glm::min(all->least, moved);
+    all->most = glm::max(all->most, moved);
+  }
+}
+
+}  // namespace
+
+std::optional<Box> box_of_others(const Model& model, const Item& item) {
+  std::optional<Box> all;
+  for (const Item& other : items_of(model.scene)) {
+    if (other == item || other.kind == Item::Kind::analytic_light) continue;
+    const auto box = box_of(model.scene, model.status.boxes, other);
+    const auto transform = transform_of(model.scene, other);
+    if (box && transform) add(all, *box, *transform);
+  }
+  const cumulet_surfaces_info& surfaces = model.status.surfaces;
+  if (!model.scene.surfaces.empty() && surfaces.triangles > 0) {
+    const auto& low = surfaces.bounds_min;
+    const auto& high = surfaces.bounds_max;
+    add(all, {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}}, glm::dmat4(1.0));
+  }
+  return all;
+}
+
+std::optional<Placement> place_in(const Box& scene, const Box& object, const dvec3& eye) {
+  constexpr double max_ratio = 30.0;  // of sizes
+  constexpr double max_gap = 3.0;     // relative to the larger size
+  constexpr double wanted = 0.3;       // size relative to the scene's
+  const double scene_size = size_of(scene);
+  const double size = size_of(object);
+  if (!(scene_size > 0.0 && size > 0.0)) return std::nullopt;
+  const double ratio = size / scene_size;
+  const bool other_size = ratio < 1.0 / max_ratio || ratio > max_ratio;
+  const bool far = gap_between(scene, object) > max_gap * std::max(size, scene_size);
+  if (!other_size && !far) return std::nullopt;
+  Placement placement;
+  if (other_size) placement.scale = round_scale(wanted / ratio);
+  const dvec3 middle = 0.5 * (scene.least + scene.most);
+  const dvec3 half = 0.5 * (scene.most - scene.least);
+  const dvec3 object_half = 0.5 * placement.scale * (object.most - object.least);
+  dvec3 toward = eye - middle;
+  toward.y = 0.0;
+  toward = glm::length(toward) > 1e-9 * scene_size ? glm::normalize(toward) : dvec3(0.0, 0.0, 1.0);
+  // Reach of both boxes along the direction to the camera.
+  const double reach = glm::dot(glm::abs(toward), half + object_half);
+  dvec3 place = middle + toward * reach;
+  place.y = scene.least.y + object_half.y;
+  const dvec3 object_middle = 0.5 * (object.least + object.most);
+  placement.transform = glm::translate(glm::dmat4(1.0), place - placement.scale * object_middle);
+  placement.transform = glm::scale(placement.transform, dvec3(placement.scale));
+  return placement;
+}
+
+void App::take_added(const Item& item) {
+  select(model_, item);
+  loading_.added.push_back(item);
+}
+
+void App::place_added() {
+  for (const Item& item : std::exchange(loading_.added, {})) {
+    if (!transform_of(model_.scene, item)) continue;
+    const auto box = box_of(model_.scene, model_.status.boxes, item);
+    if (!box) {
+      loading_.added.push_back(item);
+      continue;
+    }
+    const auto others = box_of_others(model_, item);
+    if (!others) continue;
+    const auto& eye = model_.scene.camera.eye;
+    const auto placement = place_in(*others, *box, {eye[0], eye[1], eye[2]});
+    if (!placement) continue;
+    set_transform(model_.scene, item, placement->transform);
+    const double ratio = size_of(*box) / size_of(*others);
+    std::array<char, 96> text{};
+    if (placement->scale == 1.0)
+      std::snprintf(text.data(), text.size(), " is far from the scene: moved into view");
+    else if (ratio < 1.0)
+      std::snprintf(text.data(), text.size(), " is %.0f times smaller than the scene: scaled by %g", 1.0 / ratio,
+                    placement->scale);
+    else
+      std::snprintf(text.data(), text.size(), " is %.0f times larger than the scene: scaled by %g", ratio,
+                    placement->scale);
+    const bool is_model = item.kind == Item::Kind::model;
+    show_message(model_, false, row_text(model_.scene, item) + text.data(), now_,
+                 MessageButton{"Own place",
+                               "Restores the size and the place of the file.",
+                               {Action::keep_place, is_model ? "model" : "volume", static_cast<int>(item.index)}});
+  }
+}
+
+}  // namespace cumulet::demo

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <optional>
+
+#include "model.hpp"
+
+namespace cumulet::demo {
+
+/// Place of an object that was added to a scene of another size or at another place.
+struct Placement {
+  double scale = 1.0;  // 1: the object's own size suits the scene
+  glm::dmat4 transform{1.0};
+};
+
+/// Returns the world-space box of all objects of the scene except one; nullopt if there are none with a known box.
+[[nodiscard]] std::optional<Box> box_of_others(const Model& model, const Item& item);
+
+/// Returns a place for an object with this box in a scene with another box: in front of it for a camera at `eye`, on
+/// the same ground. nullopt if the object's own place is suitable: it is neither tiny nor huge nor far away.
+[[nodiscard]] std::optional<Placement> place_in(const Box& scene, const Box& object, const glm::dvec3& eye);
+
+}  // namespace cumulet::demo
