@@ -203,7 +203,8 @@ void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_text(app, group, "--velocity-grid", "NAME", scene.velocity_grid,
            "Velocity grid, for --aovs velocity and --shutter; none: not used (default: found by name)");
   add_choice(app, group, "--up", up_names, scene.up,
-             "Up axis of the volume (default: y; use z for Blender and Mantaflow)");
+             "Up axis of the volume (default: y; cumulet-render uses z if the metadata of the file names Blender or "
+             "Mantaflow, but not with --camera or a scene file)");
   add(
       app, group, "--clip-box", "X0,Y0,Z0,X1,Y1,Z1|none",
       [&scene](const std::string& text) { scene.clip.box = parse_clip_box(text); },
@@ -762,6 +763,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   options.denoises_by_default = app.count("--denoise") == 0;
   options.default_look = std::ranges::all_of(look_flags, [&](const char* flag) { return app.count(flag) == 0; });
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);
+  options.gives_up = app.count("--up") > 0;
+  // A given camera is made for the file's own axes.
+  options.default_up = !options.gives_up && app.count("--camera") + app.count("--scene") == 0 && !lit;
   check_together(options, part);
   // Like every scene setting, it changes the scene hash in the file.
   options.scene.display.denoise = options.denoise == Denoise::off ? CUMULET_DENOISE_OFF : CUMULET_DENOISE_FAST;

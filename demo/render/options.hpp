@@ -75,6 +75,8 @@ struct RenderOptions {
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
   bool default_look = true;  // no flag sets light, exposure or tone map
 
+  bool gives_up = false;     // --up is given
+  bool default_up = true;    // the metadata of the volume names its up axis
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };
 
