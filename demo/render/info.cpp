@@ -2,6 +2,7 @@
 
 #include <cumulet/cumulet.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -193,17 +194,28 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out) {
   }
 }
 
-UpAxis known_up_axis(const std::string& volume_file) {
-  try {
-    return is_z_up(volume_file) ? UpAxis::z : UpAxis::y;
-  } catch (const std::exception&) {  // loading reports the cause
-    return UpAxis::y;
+UpAxis known_up_axis(const std::string& volume_file) { return known_up_axis(std::span(&volume_file, 1)); }
+
+UpAxis known_up_axis(std::span<const std::string> volume_files) {
+  for (const std::string& file : volume_files) {
+    try {
+      return is_z_up(file) ? UpAxis::z : UpAxis::y;
+    } catch (const std::exception&) {  // loading reports the cause
+      continue;
+    }
   }
+  return UpAxis::y;
 }
 
-std::optional<std::string> up_hint(const SceneVolume& volume) {
-  if (!volume.is_shown() || volume.up != UpAxis::y || !is_z_up(volume.volume)) return std::nullopt;
-  return volume.volume + ": written by Blender or Mantaflow, whose up axis is Z: try --up z";
+std::vector<std::string> up_hints(const SceneOptions& scene) {
+  std::vector<std::string> hints;
+  const auto add = [&hints](const SceneVolume& volume) {
+    if (volume.is_shown() && volume.up == UpAxis::y && known_up_axis(volume.volume) == UpAxis::z)
+      hints.push_back(volume.volume + ": written by Blender or Mantaflow, whose up axis is Z: try --up z");
+  };
+  add(scene);
+  std::ranges::for_each(scene.others, add);
+  return hints;
 }
 
 }  // namespace cumulet::demo

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <iosfwd>
-#include <optional>
 #include <scene_file.hpp>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace cumulet::demo {
 
@@ -15,7 +16,10 @@ void write_info(const SceneOptions& scene, bool as_json, std::ostream& out);
 /// that cannot be read.
 [[nodiscard]] UpAxis known_up_axis(const std::string& volume_file);
 
-/// Returns a hint if the volume is shown with Y up and its metadata names Blender or Mantaflow, whose up axis is Z.
-[[nodiscard]] std::optional<std::string> up_hint(const SceneVolume& volume);
+/// Returns known_up_axis() of the first of these files that can be read; Y if there is none.
+[[nodiscard]] UpAxis known_up_axis(std::span<const std::string> volume_files);
+
+/// Returns a hint for each volume of the scene that is shown with Y up and whose metadata names Blender or Mantaflow.
+[[nodiscard]] std::vector<std::string> up_hints(const SceneOptions& scene);
 
 }  // namespace cumulet::demo

@@ -49,6 +49,7 @@
 #include "stats.hpp"
 #include "time_limit.hpp"
 #include "transforms.hpp"
+#include "up_axis.hpp"
 
 namespace {
 
@@ -344,9 +345,6 @@ class Studio {
 
   /// Logs the hints about a loaded volume. Call once.
   void remark(const SceneOptions& scene) {
-    if (const auto hint = cumulet::demo::up_hint(scene)) print_line(progress_, *hint);
-    for (const cumulet::demo::SceneVolume& other : scene.others)
-      if (const auto hint = cumulet::demo::up_hint(other)) print_line(progress_, *hint);
     if (scene.is_shown() && scene.auto_density_scale)
       cumulet::demo::print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
     if (fire_) cumulet::demo::print_fire(*fire_, progress_);
@@ -786,9 +784,10 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
 
 int main(int argc, char** argv) {
   return cumulet::demo::run_program("cumulet-render", [&] {
-    const auto options = cumulet::demo::parse_render_options({argv + std::min(argc, 1), argv + argc}, std::cout);
+    auto options = cumulet::demo::parse_render_options({argv + std::min(argc, 1), argv + argc}, std::cout);
     if (!options) return;
     const auto plan = cumulet::demo::plan_frames(*options);
+    cumulet::demo::choose_up_axis(*options, plan);
     if (plan) {
       render_frames(*options, *plan);
     } else if (options->info) {

@@ -203,7 +203,8 @@ void add_volume_options(CLI::App& app, const char* group, SceneOptions& scene) {
   add_text(app, group, "--velocity-grid", "NAME", scene.velocity_grid,
            "Velocity grid, for --aovs velocity and --shutter; none: not used (default: found by name)");
   add_choice(app, group, "--up", up_names, scene.up,
-             "Up axis of the volume (default: y; use z for Blender and Mantaflow)");
+             "Up axis of the volume (default: y; cumulet-render uses z if the metadata of the file names Blender or "
+             "Mantaflow, but not with --camera or a scene file)");
   add(
       app, group, "--clip-box", "X0,Y0,Z0,X1,Y1,Z1|none",
       [&scene](const std::string& text) { scene.clip.box = parse_clip_box(text); },
@@ -418,8 +419,10 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
     if (app.count("--sky-model") > 0) {
       scene.light.turbidity = given.turbidity;
       scene.light.ground_albedo = given.ground_albedo;
-    } else if (app.count("--ground") == 0 && scene.surfaces.empty() && !files.model) {
-      scene.ground.mode = CUMULET_GROUND_BELOW;
+    } else if (app.count("--ground") == 0) {
+      // A model that is cut out for compositing needs none.
+      const bool below_models = files.ground_below_models && scene.display.background == CUMULET_BACKGROUND_SKY;
+      if ((scene.surfaces.empty() && !files.model) || below_models) scene.ground.mode = CUMULET_GROUND_BELOW;
     }
   }
   if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
@@ -738,7 +741,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   add_device_options(app, group, options);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  finish_scene_options(app, options.scene, {.scene = lit});
+  finish_scene_options(app, options.scene, {.scene = lit, .ground_below_models = true});
   if (options.thumbnail) {
     make_thumbnail(app, options);
   } else if (!options.output.empty() || app.count("--output") > 0) {
@@ -760,6 +763,9 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (!options.lut.empty()) ocio = {};
   if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   options.denoises_by_default = app.count("--denoise") == 0;
+  options.gives_up = app.count("--up") > 0;
+  // A given camera is made for the file's own axes.
+  options.default_up = !options.gives_up && app.count("--camera") + app.count("--scene") == 0 && !lit;
   options.default_look = std::ranges::all_of(look_flags, [&](const char* flag) { return app.count(flag) == 0; });
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);
   check_together(options, part);

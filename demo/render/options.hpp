@@ -27,10 +27,11 @@ void add_ocio_options(CLI::App& app, const char* group, OcioView& view);
 /// Completes the view after the parse: another tone map or LUT replaces that of a scene file. Throws UsageError for
 /// flags that exclude each other or lack --ocio.
 void finish_ocio_options(const CLI::App& app, OcioView& view);
-/// Kinds of files that were named without a flag.
+/// Kinds of files that were named without a flag, and the default under models.
 struct NamedFiles {
   bool scene = false;  ///< a scene file, which sets the light
   bool model = false;
+  bool ground_below_models = false;
 };
 /// Completes the scene after the parse: sets daylight unless a flag or file sets the light, and checks flags that
 /// exclude each other. Throws UsageError.
@@ -74,6 +75,8 @@ struct RenderOptions {
   std::string lut;                         // a .cube file; empty: none
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
   bool default_look = true;  // no flag sets light, exposure or tone map
+  bool gives_up = false;     // --up is given
+  bool default_up = true;    // the metadata of the volume names its up axis
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }
 };

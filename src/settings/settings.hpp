@@ -351,8 +351,8 @@ struct Table<cumulet_ground_desc> {
   static constexpr std::tuple rows = {
       Setting(&Desc::mode, {.name = "mode", .choices = ground_choices,
         .key = "ground.mode", .flag = "--ground",
-        .help = "Ground plane, an infinite diffuse plane (default: below, if neither a model nor any light is "
-                "given; else none)",
+        .help = "Ground plane, an infinite diffuse plane (default: below, if no light is given; with a model only "
+                "in cumulet-render with --background sky; else none)",
         .row = {.label = "Ground", .tip = "Infinite diffuse ground plane."}}),
       Setting(&Desc::height, {.name = "height", .range = {-1e30, 1e30},
         .key = "ground.height", .flag = "--ground-height", .type = "Y",

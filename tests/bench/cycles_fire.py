@@ -21,6 +21,13 @@ from cycles_gltf import PEER_PATH, SKY, SUN, Unusable, compare, numpy, read_pfm,
 FOVY = 40
 
 
+def channels(ours, theirs):
+    """Returns the means of red, green and blue relative to Cycles, in percent, where there is more than sky."""
+    a, b = (sum(images) / 2 for images in (ours, theirs))
+    shown = abs(b - numpy.array(SKY["radiance"])).max(axis=2) > 1e-4
+    return " ".join(f"{100 * (a[shown][:, i].sum() / b[shown][:, i].sum() - 1):+.2f}" for i in range(3))
+
+
 def described(options):
     """Returns the scene for Cumulet and the scene for Cycles."""
     medium = {"density_scale": options.density_scale, "albedo": [options.albedo] * 3, "max_bounces": options.max_bounces}
@@ -112,7 +119,8 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     ours, theirs = described(options)
     b = [read_pfm(file) for file in render_theirs(options, theirs)]
-    print("| Grid type | Cells | Step of Cycles | Mean, % | Blocks, % (their noise) | Worst block, % (its noise), at |\n|---|--:|--:|--:|--:|--:|")
+    print("| Grid type | Cells | Step of Cycles | Mean, % | Blocks, % (their noise) | Worst block, % (its noise), at "
+          "| Red, green, blue, % |\n|---|--:|--:|--:|--:|--:|--:|")
     failed = False
     for grid_type in options.grid_types:
         files, cells = render_ours(options, ours, grid_type)
@@ -121,7 +129,8 @@ def main():
         x, y = found["worst_at"]
         print(f"| {grid_type} | {cells} | {options.step:g} | {100 * found['mean']:+.2f} ± {100 * found['mean_noise']:.2f} "
               f"| {100 * found['blocks']:.2f} ({100 * found['blocks_noise']:.2f}) "
-              f"| {100 * found['worst']:+.1f} ({100 * found['worst_noise']:.1f}), {x} {y} |", flush=True)
+              f"| {100 * found['worst']:+.1f} ({100 * found['worst_noise']:.1f}), {x} {y} "
+              f"| {channels(a, b)} |", flush=True)
         first, second = (sum(images) / 2 for images in (a, b))
         write_png(options.out / "fire.png", numpy.concatenate([first, second, 0.5 + 8 * (first - second) / 2], axis=1))
         if options.within:

@@ -76,10 +76,11 @@ def main():
         return [row[x:x + 3] for row in picture.rows for x in range(0, n * picture.width, n)], done.stderr
 
     pixels, messages = fire("fire")
-    burnt, orange, dark = (sum(map(test, pixels)) / len(pixels) for test in (
-        lambda p: min(p) > 250, lambda p: p[0] > 150 and p[0] > 1.4 * p[2] and p[0] > 1.15 * p[1], lambda p: max(p) < 70))
-    print(f"fire: burnt {100 * burnt:.2f} %, orange {100 * orange:.2f} %, dark {100 * dark:.2f} %")
-    assert burnt < 0.002 and orange > 0.03 and dark > 0.01, (burnt, orange, dark)
+    burnt, orange, pale, dark = (sum(map(test, pixels)) / len(pixels) for test in (
+        lambda p: min(p) > 250, lambda p: p[0] > 150 and p[0] > 1.4 * p[2] and p[0] > 1.15 * p[1],
+        lambda p: p[0] > 240 and p[2] > 150 and p[0] > 1.1 * p[2], lambda p: max(p) < 70))
+    print(f"fire: burnt {100 * burnt:.2f} %, orange {100 * orange:.2f} %, pale {100 * pale:.2f} %, dark {100 * dark:.2f} %")
+    assert burnt < 0.002 and orange > 0.03 and pale < 0.01 and dark > 0.01, (burnt, orange, pale, dark)
     assert messages.count("using dusk light, --tone-map filmic and --exposure 1 ") == 1, messages
     # Any option of the look keeps the daylight.
     blue = lambda pixels: sum(p[2] - p[0] for p in pixels[:8 * 64]) / (8 * 64)  # of the sky

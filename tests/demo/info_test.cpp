@@ -1,4 +1,4 @@
-// cumulet-render --info, as lines and as JSON, and its hint about the up axis.
+// cumulet-render --info, as lines and as JSON, and the up axis that it chooses.
 
 #include "info.hpp"
 
@@ -6,17 +6,23 @@
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "support/folder.hpp"
 #include "support/openvdb.hpp"
+#include "up_axis.hpp"
 
 namespace {
 
 using cumulet::demo::SceneOptions;
+using cumulet::demo::UpAxis;
 using nlohmann::json;
 
 openvdb::FloatGrid::Ptr box(const std::string& name) {
@@ -189,30 +195,75 @@ TEST_F(Info, DescribesAModel) {
   EXPECT_THROW(info_of(scene), std::runtime_error);
 }
 
-TEST_F(Info, HintsAtTheUpAxisOfBlenderAndMantaflow) {
-  openvdb::MetaMap blender;
-  blender.insertMeta("creator", openvdb::StringMetadata("Blender/Smoke"));
-  write_vdb("blender.vdb", {box("density")}, blender);
-  openvdb::MetaMap other;
-  other.insertMeta("creator", openvdb::StringMetadata("Houdini"));
-  write_vdb("other.vdb", {box("density")}, other);
-  const auto signed_by_mantaflow = box("density");
-  signed_by_mantaflow->insertMeta("file_base_resolution", openvdb::Vec3IMetadata(openvdb::Vec3i(64)));
-  write_vdb("mantaflow.vdb", {box("shadow"), signed_by_mantaflow});
-  for (const char* name : {"blender.vdb", "mantaflow.vdb"}) {
-    SceneOptions scene = volume(name);
-    const auto hint = cumulet::demo::up_hint(scene);
-    ASSERT_TRUE(hint) << name;
-    EXPECT_EQ(hint->find(path(name) + ": "), 0U);
-    EXPECT_NE(hint->find("--up z"), std::string::npos);
-    scene.up = cumulet::demo::UpAxis::z;
-    EXPECT_FALSE(cumulet::demo::up_hint(scene));
-    EXPECT_EQ(cumulet::demo::known_up_axis(path(name)), cumulet::demo::UpAxis::z);
+class UpAxes : public Info {
+ protected:
+  UpAxes() {
+    openvdb::MetaMap blender;
+    blender.insertMeta("creator", openvdb::StringMetadata("Blender/Smoke"));
+    write_vdb("blender.vdb", {box("density")}, blender);
+    openvdb::MetaMap other;
+    other.insertMeta("creator", openvdb::StringMetadata("Houdini"));
+    write_vdb("other.vdb", {box("density")}, other);
+    const auto signed_by_mantaflow = box("density");
+    signed_by_mantaflow->insertMeta("file_base_resolution", openvdb::Vec3IMetadata(openvdb::Vec3i(64)));
+    write_vdb("mantaflow.vdb", {box("shadow"), signed_by_mantaflow});
   }
+
+  // Parses the arguments of cumulet-render and chooses the up axis. Returns the axis and the printed lines.
+  static std::pair<UpAxis, std::string> chosen(std::vector<std::string> arguments,
+                                               const std::optional<cumulet::demo::FramePlan>& plan = std::nullopt) {
+    std::ostringstream out;
+    for (const char* argument : {"-o", "a.exr"}) arguments.emplace_back(argument);
+    auto options = cumulet::demo::parse_render_options(std::move(arguments), out);
+    testing::internal::CaptureStderr();
+    cumulet::demo::choose_up_axis(options.value(), plan);
+    return {options->scene.up, testing::internal::GetCapturedStderr()};
+  }
+};
+
+TEST_F(UpAxes, MetadataNamesThem) {
+  for (const char* name : {"blender.vdb", "mantaflow.vdb"})
+    EXPECT_EQ(cumulet::demo::known_up_axis(path(name)), UpAxis::z) << name;
   for (const char* name : {"other.vdb", "missing.vdb"})
-    EXPECT_EQ(cumulet::demo::known_up_axis(path(name)), cumulet::demo::UpAxis::y) << name;
-  EXPECT_FALSE(cumulet::demo::up_hint(volume("other.vdb")));
-  EXPECT_FALSE(cumulet::demo::up_hint(SceneOptions()));
+    EXPECT_EQ(cumulet::demo::known_up_axis(path(name)), UpAxis::y) << name;
+}
+
+// A fire of Mantaflow lay on its side in the first picture.
+TEST_F(UpAxes, FirstPicturesStandUpright) {
+  for (const char* name : {"blender.vdb", "mantaflow.vdb"}) {
+    const auto [up, lines] = chosen({path(name)});
+    EXPECT_EQ(up, UpAxis::z) << name;
+    EXPECT_EQ(lines.find(path(name) + ": Z is up, as its metadata says: using --up z"), 0U) << lines;
+    EXPECT_EQ(std::ranges::count(lines, '\n'), 1) << lines;
+  }
+  EXPECT_EQ(chosen({path("other.vdb")}), std::pair(UpAxis::y, std::string()));
+  EXPECT_EQ(chosen({path("missing.vdb")}), std::pair(UpAxis::y, std::string()));
+}
+
+TEST_F(UpAxes, GivenSettingsKeepTheFilesAxes) {
+  EXPECT_EQ(chosen({path("blender.vdb"), "--up", "y"}), std::pair(UpAxis::y, std::string()));
+  EXPECT_EQ(chosen({path("blender.vdb"), "--up", "z"}), std::pair(UpAxis::z, std::string()));
+  EXPECT_EQ(chosen({path("blender.vdb"), "--info"}), std::pair(UpAxis::y, std::string()));
+  const std::string scene = path("scene.json");
+  std::ofstream(scene) << R"({"cumulet_scene": 3})";
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--camera", "0,0,9 0,0,0 40"}, {"--scene", scene}, {scene}}) {
+    std::vector<std::string> arguments = {"--volume", path("blender.vdb")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto [up, lines] = chosen(arguments);
+    EXPECT_EQ(up, UpAxis::y) << more.front();
+    EXPECT_EQ(lines.find(path("blender.vdb") + ": "), 0U) << lines;
+    EXPECT_NE(lines.find("try --up z"), std::string::npos) << lines;
+  }
+}
+
+// All frames have the axis of the first file that can be read.
+TEST_F(UpAxes, SequencesHaveOneAxis) {
+  cumulet::demo::FramePlan plan;
+  plan.analyzed_by = {path("missing.vdb"), path("mantaflow.vdb"), path("other.vdb")};
+  EXPECT_EQ(chosen({path("####.vdb")}, plan).first, UpAxis::z);
+  plan.analyzed_by = {path("other.vdb"), path("mantaflow.vdb")};
+  EXPECT_EQ(chosen({path("####.vdb")}, plan), std::pair(UpAxis::y, std::string()));
 }
 
 }  // namespace

@@ -64,6 +64,25 @@ TEST(BlackBody, OutOfGamutColorsAreClipped) {
   EXPECT_EQ(black_body_color(500.0).g, 0.0);
 }
 
+// Radiance of 1 unit of length in Blender 3.4.1 (tests/bench/results/cycles_material.csv), whose colors are a fit.
+TEST(BlackBody, AgreesWithCycles) {
+  struct Measured {
+    double kelvin;
+    glm::dvec3 radiance;
+  };
+  constexpr std::array<Measured, 7> cycles = {{{1000.0, {0.0830514, 0.000704686, 0.0}},
+                                               {1500.0, {0.298278, 0.0396611, 0.0}},
+                                               {2000.0, {0.727782, 0.186802, 0.00589502}},
+                                               {3000.0, {2.58896, 1.23434, 0.397987}},
+                                               {6500.0, {33.5899, 31.7052, 33.3555}},
+                                               {10000.0, {157.28, 179.578, 258.2}},
+                                               {12000.0, {309.26, 372.218, 586.224}}}};
+  for (const Measured& m : cycles) {
+    const glm::dvec3 ours = black_body_color(m.kelvin) * black_body_radiance(m.kelvin, 1.0);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(ours[i], m.radiance[i], 0.011 * m.radiance[i]) << m.kelvin << " K, " << i;
+  }
+}
+
 TEST(BlackBody, RadianceFollowsStefanBoltzmann) {
   const double constant = 1.0e-6 * 5.670373e-8 / std::numbers::pi;
   EXPECT_DOUBLE_EQ(black_body_radiance(2000.0, 1.0), constant * 1.6e13);

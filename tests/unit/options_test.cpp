@@ -151,6 +151,17 @@ TEST(Options, ExplicitLightReplacesTheDefaultLight) {
   expect_rgb(night.scene.light.sky_radiance, 0.0f, 0.0f, 0.0f);
 }
 
+// Models floated above the sky's gray, without a shadow.
+TEST(Options, DefaultLightShinesOnAGround) {
+  const auto ground = [](std::vector<std::string> more) { return parse(std::move(more)).scene.ground.mode; };
+  EXPECT_EQ(ground({}), CUMULET_GROUND_BELOW);
+  EXPECT_EQ(ground({"--gltf", "m.glb"}), CUMULET_GROUND_BELOW);
+  EXPECT_EQ(ground({"--gltf", "m.glb", "--ground", "none"}), CUMULET_GROUND_NONE);
+  EXPECT_EQ(ground({"--gltf", "m.glb", "--background", "transparent"}), CUMULET_GROUND_NONE);
+  EXPECT_EQ(ground({"--gltf", "m.glb", "--background-color", "0,0,0"}), CUMULET_GROUND_NONE);
+  EXPECT_EQ(ground({"--gltf", "m.glb", "--sky", "1,1,1"}), CUMULET_GROUND_NONE);
+}
+
 TEST(Options, SkyModelReplacesOnlyTheSun) {
   const RenderOptions clear = parse({"--sky-model", "2.5,.25", "--sun", "120,20"});
   EXPECT_EQ(clear.scene.light.sky, CUMULET_SKY_PHYSICAL);
