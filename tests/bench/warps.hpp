@@ -76,8 +76,8 @@ struct Segment {
   double latency = 0.0;  // after them
 };
 
-/// Runs warps on one scheduler. At most `resident` are there at once, and they share its issue slots. next(warp, segment)
-/// sets the next segment of a warp, or returns false at its end. Returns the time in cycles.
+/// Runs warps on one scheduler. At most `resident` are there at once, and they share its issue slots. next(warp,
+/// segment) sets the next segment of a warp, or returns false at its end. Returns the time in cycles.
 template <class Next>
 double run_warps(std::size_t count, std::size_t resident, Next&& next) {
   struct Running {
