@@ -10,6 +10,7 @@ namespace cumulet::bench {
 namespace {
 
 constexpr std::size_t warp_lanes = 32;
+constexpr double path_latency = 600.0;  // of a path in memory
 
 /// A path in flight, which belongs to a pixel.
 struct Flight {
@@ -70,7 +71,6 @@ struct QueuePolicy {
   double between = 0.0;                        // seconds between two kernels, which wait for each other
   double bandwidth = 0.0;                      // bytes/s of the GPU's memory, or of L2 if all paths fit into it
   static constexpr std::size_t resident = 10;  // warps per scheduler, with 48 registers
-  static constexpr double load = 600.0;        // latency of a path
   static constexpr double march_bytes = 72.0;  // of a visit; with the place in the queues
   static constexpr double event_bytes = 264.0;
   static constexpr double camera_bytes = 360.0;  // with the pixel
@@ -136,7 +136,7 @@ class Queues {
       send(lane);
     }
     sums_.count(Work::camera, lanes.size());
-    return {VisitCosts{}.camera + levels * Costs::level, 2.0 * QueuePolicy::load + Costs::film + levels * Costs::fetch};
+    return {VisitCosts{}.camera + levels * Costs::level, 2.0 * path_latency + Costs::film + levels * Costs::fetch};
   }
   Segment events(std::span<const std::size_t> lanes) {
     bool all_end = true;
@@ -147,7 +147,7 @@ class Queues {
       send(lane);
     }
     sums_.count(Work::event, lanes.size());
-    return {all_end ? Costs::end : VisitCosts{}.event, 2.0 * QueuePolicy::load};
+    return {all_end ? Costs::end : VisitCosts{}.event, 2.0 * path_latency};
   }
   double march() {
     struct Warp {
@@ -161,7 +161,7 @@ class Queues {
       Warp& warp = warps[index];
       if (warp.lanes.empty()) return false;
       if (warp.cells++ < 0) {
-        segment = {VisitCosts{}.march, 2.0 * QueuePolicy::load};
+        segment = {VisitCosts{}.march, 2.0 * path_latency};
         move(QueuePolicy::march_bytes * static_cast<double>(warp.lanes.size()));
       } else {
         sums_.count(Work::step, warp.lanes.size());
@@ -191,7 +191,7 @@ class Queues {
 
 struct GroupPolicy {
   std::string name;
-  std::size_t resident = 5;                  // groups per scheduler: of 9.3 KB of shared memory
+  std::size_t resident = 7;                  // groups per scheduler: of 72 registers
   static constexpr std::size_t paths = 64;   // of a group
   static constexpr std::size_t enough = 28;  // rays to march, for which nothing else is done first
   static constexpr int cells = 4;            // of a turn
@@ -200,8 +200,8 @@ struct GroupPolicy {
   static constexpr double latency = 100.0;
 };
 
-/// Groups of a warp with twice as many paths in shared memory. Each turn the warp does the work for which most of them
-/// wait (two_paths/path/two_paths.glsl).
+/// Groups of a warp with twice as many paths, whose rays are in shared memory. Each turn the warp does the work for
+/// which most of them wait (two_paths/path/two_paths.glsl).
 class Groups {
  public:
   Groups(const GroupPolicy& policy, Places places, Sums& sums)
@@ -261,13 +261,14 @@ class Groups {
       flight->advance();
     }
     segment.instructions += all_end ? Costs::end : VisitCosts{}.event;
+    segment.latency += path_latency;
   }
   void begin(const Flights& chosen, Segment& segment) {
     sums_.count(Work::camera, chosen.size());
     int levels = 0;
     for (Flight* flight : chosen) levels = std::max(levels, start(*flight, places_));
     segment.instructions += VisitCosts{}.camera + levels * Costs::level;
-    segment.latency += Costs::film + levels * Costs::fetch;
+    segment.latency += path_latency + Costs::film + levels * Costs::fetch;
   }
 
   const GroupPolicy& policy_;
@@ -308,9 +309,8 @@ void simulate_kernels(const std::vector<Pixel>& pixels, const std::vector<std::u
       {"queues, 16 cells, 262,144 paths in L2", in_cache, 16, between, cache},
       {"queues, 8 cells, a million paths, 5 us between kernels", many, 8, 5e-6, memory},
   };
-  const std::vector<GroupPolicy> groups{{.name = "two paths a lane in shared memory"},
-                                        {.name = "the same, room for 3 groups", .resident = 3},
-                                        {.name = "the same, room for 2 groups (Ada)", .resident = 2}};
+  const std::vector<GroupPolicy> groups{{.name = "two paths a lane"},
+                                        {.name = "the same, room for 4 groups (Ada)", .resident = 4}};
   print_header();
   for (const QueuePolicy& policy : queues) simulate<Queues>(pixels, passes, policy, first);
   for (const GroupPolicy& policy : groups) simulate<Groups>(pixels, passes, policy, first);

@@ -30,6 +30,7 @@ layout(local_size_x = 8, local_size_y = 4) in;
 layout(local_size_x = 8, local_size_y = 8) in;
 #endif
 """),
+    ("path/path_store.glsl", "buffer CmPaths {", "coherent buffer CmPaths {"),
     ("path/trace.comp", "void main() {\n", """#if CM_TWO_PATHS
 #include "path/two_paths.glsl"
 void main() { cm_two_paths(); }

@@ -134,6 +134,7 @@ extern "C" __global__ void __launch_bounds__(64) cm_cost_store() {
 #include "path/path_blocks.glsl"
 #define shared __shared__
 #define barrier __syncthreads
+#define memoryBarrierBuffer __threadfence_block
 #define gl_LocalInvocationIndex threadIdx.x
 #define gl_WorkGroupID blockIdx
 __device__ uint4 cm_total;
@@ -141,6 +142,7 @@ __device__ uint4 cm_running;
 __device__ uint4 cm_blocks[CM_MAX_BLOCKS];
 __device__ uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];
 __device__ uint* cm_slot_words;
+__device__ uvec4* cm_paths;
 CM_FN uint cm_atomic_add(uint& sum, uint value) { return ::atomicAdd(&sum, value); }
 #define atomicAdd cm_atomic_add
 CM_FN uint cm_lanes() { return cm.dispatch.lanes; }

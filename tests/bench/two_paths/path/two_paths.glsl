@@ -1,5 +1,5 @@
 // trace.comp with twice as many paths as lanes, an experiment for GPUs (docs/performance.md, Predicted changes). A group
-// of a warp has its paths in shared memory. In each turn all lanes do the same kind of work, on paths that wait for it.
+// of a warp has the rays of its paths in shared memory. In each turn all lanes do the same kind of work, on paths that wait for it.
 // So paths with events do not hold back lanes that traverse cells. Paths do not depend on each other, so the pictures
 // are those of trace.comp. In a copy of glsl/ it is added to trace.comp (tests/gpu/shader_variants.py). Shared by GLSL
 // and CUDA (tests/gpu_cost/cuda/kernels.cu). The includer provides the functions of trace.comp.
@@ -17,20 +17,31 @@
 #define CM_WORK_CAMERA 2u  // finish a sample and start the next one
 #define CM_WORKS 3u
 
-// The paths: planes of four words per path. A march reads three of them and writes one, CM_QUAD_MARCH.
+// The paths: planes of four words per path. A march reads three of them and writes one, CM_QUAD_MARCH. The others are in
+// the buffer of the paths, so that a multiprocessor has room for more groups.
 #define CM_QUAD_RAY 0u        // o, t_end
 #define CM_QUAD_DIRECTION 1u  // d, depth_0
 #define CM_QUAD_MARCH 2u      // t, depth, cell, steps
-#define CM_QUADS 8u
-shared uvec4 cm_group_paths[CM_GROUP_PATHS * CM_QUADS];
+#define CM_SHARED_QUADS 3u
+shared uvec4 cm_group_paths[CM_GROUP_PATHS * CM_SHARED_QUADS];
+shared uint cm_group_lanes[CM_GROUP_PATHS];    // in the dispatch; cm_lanes() or more: there is no path
 shared uint cm_group_stages[CM_GROUP_PATHS];   // with the event, from bit 4 on
 shared uint cm_group_lists[CM_WORKS * CM_GROUP_PATHS];
 shared uint cm_group_counts[2u * CM_WORKS];    // of the lists; alternate turns
 shared uint cm_group_marches;
 shared uint cm_group_finished;
 
-CM_FN uvec4 cm_quad(uint slot, uint quad) { return cm_group_paths[quad * CM_GROUP_PATHS + slot]; }
-CM_FN void cm_set_quad(uint slot, uint quad, uvec4 words) { cm_group_paths[quad * CM_GROUP_PATHS + slot] = words; }
+CM_FN uvec4 cm_quad(uint slot, uint quad) {
+  if (quad < CM_SHARED_QUADS) return cm_group_paths[quad * CM_GROUP_PATHS + slot];
+  return cm_paths[cm_group_lanes[slot] + quad * cm_lanes()];
+}
+CM_FN void cm_set_quad(uint slot, uint quad, uvec4 words) {
+  if (quad < CM_SHARED_QUADS) {
+    cm_group_paths[quad * CM_GROUP_PATHS + slot] = words;
+  } else {
+    cm_paths[cm_group_lanes[slot] + quad * cm_lanes()] = words;
+  }
+}
 CM_FN uvec4 cm_words_of(vec3 v, uint w) { return uvec4(floatBitsToUint(v), w); }
 
 CM_FN void cm_take_ray(CM_INOUT(CmPath) p, uint slot) {
@@ -156,22 +167,22 @@ CM_FN void cm_camera_turn(uint slot) {
 // Loads a path, or gives it its first pixel.
 CM_FN void cm_load_slot(uint slot) {
   uint lane = cm_lane_of(slot);
+  cm_group_lanes[slot] = lane;
+  cm_group_stages[slot] = CM_STAGE_DONE;
+  if (lane >= cm_lanes()) return;
   CmPath p = cm_begin_path();
   uint samples = 0u;
-  p.stage = CM_STAGE_DONE;
-  if (lane < cm_lanes()) {
-    if (cm_block_begins()) {
-      cm_take_slot(p, lane, samples);
-    } else {
-      p = cm_load_path(lane);
-      samples = cm_pixel_samples(cm_pixel_of(p.slot));
-    }
+  if (cm_block_begins()) {
+    cm_take_slot(p, lane, samples);
+  } else {
+    p = cm_load_path(lane);
+    samples = cm_pixel_samples(cm_pixel_of(p.slot));
   }
   cm_keep(p, slot, samples);
 }
 
 CM_FN void cm_store_slot(uint slot) {
-  uint lane = cm_lane_of(slot);
+  uint lane = cm_group_lanes[slot];
   if (lane >= cm_lanes()) return;
   uint samples;
   CmPath p = cm_take(slot, samples);
@@ -200,8 +211,10 @@ CM_FN void cm_two_paths() {
     cm_group_marches = 0u;
     cm_group_finished = 0u;
   }
+  memoryBarrierBuffer();
   barrier();
-  if (cm_lane_of(0u) < cm_lanes()) cm_count_group();
+  uint lane = cm_group_lanes[0];
+  if (lane < cm_lanes()) cm_count_group();
   bool more = true;
   for (uint turn = 0u; turn < cm.dispatch.rounds * CM_TURNS_PER_ROUND && more; ++turn) {
     for (uint slot = self; slot < CM_GROUP_PATHS; slot += CM_GROUP_LANES) cm_list_slot(slot, turn);
@@ -226,11 +239,12 @@ CM_FN void cm_two_paths() {
       }
     }
     if (self == 0u && marches) cm_group_marches += min(marching, CM_GROUP_LANES);
+    memoryBarrierBuffer();
     barrier();
   }
   for (uint slot = self; slot < CM_GROUP_PATHS; slot += CM_GROUP_LANES) cm_store_slot(slot);
-  if (self != 0u || cm_lane_of(0u) >= cm_lanes()) return;
-  uint block = cm_block_of(cm_lane_of(0u));
+  if (self != 0u || lane >= cm_lanes()) return;
+  uint block = cm_block_of(lane);
   atomicAdd(cm_blocks[block].w, cm_group_finished);
   // A full round of trace.comp traverses cells in up to 64 steps, as 16 turns do.
   atomicAdd(cm_total.x, (cm_group_marches + 15u) / 16u);
