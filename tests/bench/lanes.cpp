@@ -16,22 +16,14 @@
 #include <string>
 #include <vector>
 
+#include "queues.hpp"
 #include "recording.hpp"
+#include "warps.hpp"
 
 namespace {
 
 using namespace cumulet;
-
-enum class Work : std::uint8_t { camera, step, event, end, finish };
-constexpr std::size_t works = 5;
-
-struct Item {
-  Work work;
-  std::uint8_t levels = 0;  // camera: levels of the point-location tree; 0: the ray misses the bounds
-  bool kept = false;        // camera: the ray enters the same cell as the pixel's last one
-};
-using Path = std::vector<Item>;
-using Pixel = std::vector<Path>;  // its samples
+using namespace cumulet::bench;
 
 Pixel record(core::Recording& recording, glm::uvec2 at, std::uint32_t samples) {
   using namespace core;
@@ -56,8 +48,9 @@ Pixel record(core::Recording& recording, glm::uvec2 at, std::uint32_t samples) {
       }
     }
     if (p.stage == CM_STAGE_EVENT) {
+      const bool shadow = p.ray == CM_RAY_TO_LIGHT;
       recording.cm_handle(p, recording.cm_in_medium());
-      pixel.back().push_back({p.stage == CM_STAGE_FINISH ? Work::end : Work::event});
+      pixel.back().push_back({p.stage == CM_STAGE_FINISH ? Work::end : shadow ? Work::shadow : Work::event});
     }
     if (p.stage == CM_STAGE_FLY) {
       p.event = recording.cm_fly(p);
@@ -71,23 +64,6 @@ Pixel record(core::Recording& recording, glm::uvec2 at, std::uint32_t samples) {
   return pixel;
 }
 
-/// Instructions and latencies, in cycles of a scheduler.
-struct Costs {
-  double event = 836.0;  // a light sample and a scattered ray
-  double step = 166.0;
-  static constexpr double end = 300.0;
-  static constexpr double camera = 445.0 + 254.0;  // with the clip to the bounds
-  static constexpr double level = 146.0;
-  static constexpr double kept = 95.0;  // test whether the ray enters the pixel's last cell
-  static constexpr double finish = 150.0;
-  static constexpr double take = 60.0;  // of a place
-  static constexpr double turn = 15.0;
-  static constexpr double fetch = 320.0;  // latency of a cell or a tree level
-  static constexpr double film = 1200.0;  // latency of a pixel's sums, and of a place
-  static constexpr double dispatch = 5e-6 * 1.755e9;
-  static constexpr double cycles_alone = 2.0;  // per instruction of one warp
-};
-
 struct Policy {
   std::string name;
   std::vector<std::uint32_t> passes;  // samples
@@ -98,6 +74,8 @@ struct Policy {
   int chunk = 8;
   int events = 8;
   Costs costs = {};
+  bool is_built = false;  // the library's kernel
+  double shadow = 0.0;    // instructions of the end of a shadow ray, if it is no event
   static constexpr std::size_t resident = 5;
   static constexpr int rounds = 256;
 };
@@ -121,16 +99,6 @@ struct Lane {
     at = 0;
     ++place.first;
     return true;
-  }
-};
-
-struct Sums {
-  double instructions = 0.0;
-  std::array<double, works> lanes{};
-  std::array<double, works> warps{};
-  [[nodiscard]] double lanes_of(Work work) const {
-    const auto i = static_cast<std::size_t>(work);
-    return lanes.at(i) / std::max(1.0, warps.at(i));
   }
 };
 
@@ -180,22 +148,18 @@ class Warp {
  private:
   enum class Phase : std::uint8_t { cameras, events, steps, finish };
 
-  static bool travels(const Lane& lane) {
-    return lane.is_at(Work::step) || lane.is_at(Work::event) || lane.is_at(Work::end);
+  static bool is_at_event(const Lane& lane) {
+    return lane.is_at(Work::event) || lane.is_at(Work::shadow) || lane.is_at(Work::end);
   }
+  static bool travels(const Lane& lane) { return lane.is_at(Work::step) || is_at_event(lane); }
   static void take(Lane& lane, std::deque<Place>& places) {
     if (!lane.done() || places.empty()) return;
     lane.place = places.front();
     places.pop_front();
   }
-  static void count(Sums& sums, Work work, double lanes) {
-    sums.lanes.at(static_cast<std::size_t>(work)) += lanes;
-    sums.warps.at(static_cast<std::size_t>(work)) += 1.0;
-  }
-
   // Returns true if a ray missed.
   bool camera(const Policy& policy, Sums& sums) {
-    int lanes = 0;
+    std::size_t lanes = 0;
     int levels = 0;
     bool tests = false;
     bool misses = false;
@@ -209,7 +173,7 @@ class Warp {
       misses = misses || lane.is_at(Work::finish);
     }
     if (lanes == 0) return false;
-    count(sums, Work::camera, lanes);
+    sums.count(Work::camera, lanes);
     rest += Costs::camera + levels * Costs::level + (tests ? Costs::kept : 0.0);
     latency += levels * Costs::fetch + (tests ? Costs::fetch : 0.0);
     return misses;
@@ -219,20 +183,27 @@ class Warp {
     for (int i = 0; camera(policy, sums) && i < policy.misses; ++i) finish(places, sums);
   }
   void events(const Policy& policy, Sums& sums) {
-    int lanes = 0;
+    std::size_t lanes = 0;
     bool all_end = true;
+    bool any = false;
+    bool shadow = false;
     for (Lane& lane : lanes_) {
-      if (!lane.is_at(Work::event) && !lane.is_at(Work::end)) continue;
+      if (!is_at_event(lane)) continue;
       ++lanes;
+      any = any || lane.is_at(Work::event);
+      shadow = shadow || lane.is_at(Work::shadow);
       all_end = all_end && lane.is_at(Work::end);
       lane.advance();
     }
     if (lanes == 0) return;
-    count(sums, Work::event, lanes);
-    rest += all_end ? Costs::end : policy.costs.event;
+    sums.count(Work::event, lanes);
+    if (policy.shadow == 0.0)
+      rest += all_end ? Costs::end : policy.costs.event;
+    else
+      rest += (any ? policy.costs.event : all_end ? Costs::end : 0.0) + (shadow ? policy.shadow : 0.0);
   }
   bool steps(const Policy& policy, Sums& sums) {
-    int lanes = 0;
+    std::size_t lanes = 0;
     for (std::size_t i = 0; i < lanes_.size(); ++i) {
       Lane& lane = lanes_[i];
       if (stays_[i] || !lane.is_at(Work::step)) continue;
@@ -241,13 +212,13 @@ class Warp {
       stays_[i] = !lane.is_at(Work::step);
     }
     if (lanes == 0) return false;
-    count(sums, Work::step, lanes);
+    sums.count(Work::step, lanes);
     rest += policy.costs.step;
     latency += Costs::fetch;
     return true;
   }
   void finish(std::deque<Place>& places, Sums& sums) {
-    int lanes = 0;
+    std::size_t lanes = 0;
     bool takes = false;
     for (Lane& lane : lanes_) {
       if (!lane.is_at(Work::finish)) continue;
@@ -258,7 +229,7 @@ class Warp {
       takes = true;
     }
     if (lanes == 0) return;
-    count(sums, Work::finish, lanes);
+    sums.count(Work::finish, lanes);
     rest += Costs::finish + (takes ? Costs::take : 0.0);
     latency += Costs::film + (takes ? Costs::film : 0.0);
   }
@@ -273,15 +244,14 @@ class Warp {
 /// Runs the places on one scheduler. Returns the time in cycles.
 class Scheduler {
  public:
-  Scheduler(const Policy& policy, std::deque<Place> places)
-      : policy_(policy), places_(std::move(places)), warps_(policy.warps) {
+  Scheduler(const Policy& policy, std::deque<Place> places, Sums& sums)
+      : policy_(policy), places_(std::move(places)), warps_(policy.warps), sums_(sums) {
     for (Warp& warp : warps_) warp.fill(places_);
   }
   double run() {
     while (std::ranges::any_of(warps_, [](const Warp& warp) { return !warp.done(); })) dispatch();
     return time_;
   }
-  [[nodiscard]] const Sums& sums() const { return sums_; }
 
  private:
   void dispatch() {
@@ -326,7 +296,7 @@ class Scheduler {
   const Policy& policy_;
   std::deque<Place> places_;
   std::vector<Warp> warps_;
-  Sums sums_;
+  Sums& sums_;
   double time_ = 0.0;
 };
 
@@ -340,30 +310,16 @@ std::deque<Place> places_of(const std::vector<Pixel>& pixels, std::size_t first,
   return places;
 }
 
-double simulate(const std::vector<Pixel>& pixels, const Policy& policy, double before) {
-  constexpr double schedulers = 528.0;  // of an H200
-  constexpr double clock = 1.755e9;
-  double time = 0.0;
-  double paths = 0.0;
-  Sums sums;
+Sums simulate(const std::vector<Pixel>& pixels, const Policy& policy) {
+  Sums all;
   std::uint32_t first = 0;
   for (const std::uint32_t samples : policy.passes) {
-    Scheduler scheduler(policy, places_of(pixels, first, first + samples, policy.run));
-    time += scheduler.run();
-    paths += static_cast<double>(pixels.size()) * samples;
-    sums.instructions += scheduler.sums().instructions;
-    for (std::size_t i = 0; i < works; ++i) {
-      sums.lanes.at(i) += scheduler.sums().lanes.at(i);
-      sums.warps.at(i) += scheduler.sums().warps.at(i);
-    }
+    Scheduler scheduler(policy, places_of(pixels, first, first + samples, policy.run), all);
+    all.cycles += scheduler.run();
+    all.paths += static_cast<double>(pixels.size()) * samples;
     first += samples;
   }
-  std::printf("| %s | %.0f | %.2f | %.0f | %.0f | %.1f | %.1f | %.1f |\n", policy.name.c_str(),
-              1e-6 * paths / time * clock * schedulers, before > 0.0 ? before / time : 1.0, sums.instructions / paths,
-              100.0 * sums.instructions / time, sums.lanes_of(Work::step), sums.lanes_of(Work::event),
-              sums.lanes_of(Work::camera));
-  std::fflush(stdout);
-  return time;
+  return all;
 }
 
 std::vector<std::uint32_t> doubling_passes(std::uint32_t samples) {
@@ -378,6 +334,10 @@ std::vector<Policy> policies_of(std::uint32_t samples) {
   const std::vector<std::uint32_t> one{samples};
   const std::vector<std::uint32_t> two{1, samples - 1};
   const Costs variants{.event = Costs{}.event - 184.0};
+  // A prototype of the step had this many instructions.
+  const Costs table{.event = variants.event, .step = 135.0};
+  // An event also draws the next direction and its free path, which take this many.
+  const Costs both{.event = variants.event + 200.0};
   return {
       {.name = "passes of 1, 1, 2, 4...; 8 warps for 5 places", .passes = doubling_passes(samples), .warps = 8},
       {.name = "5 warps", .passes = doubling_passes(samples)},
@@ -390,7 +350,17 @@ std::vector<Policy> policies_of(std::uint32_t samples) {
       {.name = "the same, entry cell kept", .passes = two, .keeps_entry = true},
       {.name = "the same, entry cell kept, 3 misses", .passes = two, .misses = 3, .keeps_entry = true},
       {.name = "entry cell kept, rounds of 4 cells", .passes = two, .keeps_entry = true, .chunk = 4, .events = 16},
-      {.name = "entry cell kept, variants of ground and sun", .passes = two, .keeps_entry = true, .costs = variants},
+      {.name = "entry cell kept, variants of ground and sun",
+       .passes = two,
+       .keeps_entry = true,
+       .costs = variants,
+       .is_built = true},
+      {.name = "the same, a table of face normals", .passes = two, .keeps_entry = true, .costs = table},
+      {.name = "the same, light sample and next flight in one event",
+       .passes = two,
+       .keeps_entry = true,
+       .costs = both,
+       .shadow = 130.0},
   };
 }
 
@@ -419,16 +389,25 @@ void measure(core::Recording& recording, const std::filesystem::path& file, cons
       kept += path.front().kept ? 1.0 : 0.0;
     }
   }
-  std::printf(
-      "\n%s: %.1f steps a path; %.0f %% of camera rays enter, %.0f %% of these the pixel's last cell\n\n| Variant | "
-      "Million paths/s of an H200 | x | Instructions a path | Issue slots filled, %% | Lanes a step | an event | a "
-      "camera ray |\n|---|--:|--:|--:|--:|--:|--:|--:|\n",
-      file.filename().c_str(), steps / cameras, 100.0 * enters / cameras, 100.0 * kept / std::max(1.0, enters));
+  std::printf("\n%s: %.1f steps a path; %.0f %% of camera rays enter, %.0f %% of these the pixel's last cell\n",
+              file.filename().c_str(), steps / cameras, 100.0 * enters / cameras, 100.0 * kept / std::max(1.0, enters));
+  print_header();
+  const std::vector<Policy> policies = policies_of(options.samples);
   double first = 0.0;
-  for (const Policy& policy : policies_of(options.samples)) {
-    const double time = simulate(pixels, policy, first);
-    if (first == 0.0) first = time;
+  for (const Policy& policy : policies) {
+    const Sums sums = simulate(pixels, policy);
+    print_row(policy.name, sums, first);
+    if (first == 0.0) first = sums.cycles / sums.paths;
   }
+  const auto& best = *std::ranges::find(policies, true, &Policy::is_built);
+  std::printf("\nThis picture, with other kernels:\n");
+  simulate_kernels(pixels, best.passes, first);
+  std::printf("\nA picture of eight times the pixels:\n");
+  std::vector<Pixel> more;
+  for (int i = 0; i < 8; ++i) more.insert(more.end(), pixels.begin(), pixels.end());
+  print_header();
+  print_row(best.name, simulate(more, best), first);
+  simulate_kernels(more, best.passes, first);
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ if [ -z "$links" ]; then
 fi
 
 cp -r "$root/glsl" "$out/glsl"
-python3 -B "$here/shader_variants.py" "$root/glsl" "$root/tests/bench/paper" "$out/shaders"
+python3 -B "$here/shader_variants.py" "$root/glsl" "$root/tests/bench" "$out/shaders"
 mkdir -p "$out/hdda/nanovdb" "$out/data"
 cp "$root"/tests/bench/*_hdda.glsl "$out/hdda"
 nanovdb=$(find /usr/include /usr/local/include -name PNanoVDB.h 2>/dev/null | sed -n 1p)

@@ -124,11 +124,17 @@ TEST(NvidiaCost, ReportIsRead) {
   cumulet::gpu_cost::read_report(
       "ptxas info    : Compiling entry function 'a' for 'sm_90'\n"
       "    16 bytes stack frame, 8 bytes spill stores, 12 bytes spill loads\n"
-      "ptxas info    : Used 93 registers, used 0 barriers\n",
+      "ptxas info    : Used 93 registers, used 0 barriers\n"
+      "ptxas info    : Compiling entry function 'b' for 'sm_90'\n"
+      "    0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads\n"
+      "ptxas info    : Used 80 registers, used 1 barriers, 9248 bytes smem\n",
       costs);
   EXPECT_EQ(costs.at("a").registers, 93U);
   EXPECT_EQ(costs.at("a").spilled, 2U);
   EXPECT_EQ(costs.at("a").scratch_bytes, 512U);
+  EXPECT_EQ(costs.at("a").shared_bytes, 0U);
+  EXPECT_EQ(costs.at("b").registers, 80U);
+  EXPECT_EQ(costs.at("b").shared_bytes, 9248U);
 }
 
 TEST(NvidiaCost, LongestLoopIsFound) {

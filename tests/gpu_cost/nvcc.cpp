@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t instruction_bytes = 16;
-constexpr std::array<const char*, 4> parts{"trace", "step", "event", "camera"};
+constexpr std::array<const char*, 5> parts{"trace", "step", "event", "camera", "two_paths"};
 
 struct Output {
   int status;
@@ -63,11 +63,16 @@ std::vector<Instruction> instructions_of(const std::vector<unsigned char>& code)
   return all;
 }
 
-// Warps that a scheduler holds at once: a quarter of a multiprocessor's 65536 registers, in units of 256.
-std::uint32_t warps_of(std::uint32_t registers, const std::string& family) {
-  const std::uint32_t most = family == "sm_86" || family == "sm_89" ? 12 : 16;
-  const std::uint32_t per_warp = (std::max(registers, 1U) * 32 + 255) / 256 * 256;
-  return std::min(most, 16384 / per_warp);
+// Warps that a scheduler holds at once: a quarter of a multiprocessor's 65536 registers, in units of 256, and of its
+// shared memory. Groups with shared memory have one warp.
+std::uint32_t warps_of(const Cost& cost, const std::string& family) {
+  const bool is_small = family == "sm_86" || family == "sm_89";
+  const std::uint32_t most = is_small ? 12 : 16;
+  const std::uint32_t per_warp = (std::max(cost.registers, 1U) * 32 + 255) / 256 * 256;
+  const std::uint32_t warps = std::min(most, 16384 / per_warp);
+  if (cost.shared_bytes == 0) return warps;
+  constexpr std::uint32_t reserved = 1024;  // per group
+  return std::min(warps, (is_small ? 100U : 228U) * 1024 / 4 / (cost.shared_bytes + reserved));
 }
 
 std::vector<unsigned char> bytes_of(const fs::path& path) {
@@ -168,6 +173,11 @@ void read_report(const std::string& report, std::map<std::string, Cost>& costs) 
     if (const std::size_t at = line.find("Used "); at != std::string::npos) {
       if (std::sscanf(&line[at], "Used %u registers", &registers) == 1) costs[function].registers = registers;
     }
+    if (const std::size_t at = line.find(" bytes smem"); at != std::string::npos) {
+      unsigned shared = 0;
+      if (std::sscanf(&line[line.rfind(' ', at - 1)], " %u bytes smem", &shared) == 1)
+        costs[function].shared_bytes = shared;
+    }
   }
 }
 
@@ -179,7 +189,7 @@ std::unique_ptr<Nvcc> Nvcc::open(const std::string& family, const std::string& g
   if (nvcc->version_.empty()) return nullptr;
   for (const int linear : {0, 1}) {
     for (auto& [name, cost] : compile(family, glsl.empty() ? CUMULET_GLSL_DIR : glsl, linear)) {
-      cost.waves = warps_of(cost.registers, family);
+      cost.waves = warps_of(cost, family);
       constexpr std::size_t prefix = std::string_view("cm_cost_").size();
       nvcc->costs_[name.substr(std::min(prefix, name.size())) + " LINEAR=" + std::to_string(linear)] = cost;
     }

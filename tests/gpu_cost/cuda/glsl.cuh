@@ -44,6 +44,9 @@ CM_FN vec3 normalize(vec3 v) { return v * rsqrtf(dot(v, v)); }
 CM_FN float length(vec3 v) { return sqrtf(dot(v, v)); }
 CM_FN uint floatBitsToUint(float x) { return __float_as_uint(x); }
 CM_FN float uintBitsToFloat(uint x) { return __uint_as_float(x); }
+CM_FN uvec2 floatBitsToUint(vec2 v) { return uvec2(floatBitsToUint(v.x), floatBitsToUint(v.y)); }
+CM_FN uvec3 floatBitsToUint(vec3 v) { return uvec3(floatBitsToUint(v.x), floatBitsToUint(v.y), floatBitsToUint(v.z)); }
+CM_FN vec3 uintBitsToFloat(uvec3 v) { return vec3(uintBitsToFloat(v.x), uintBitsToFloat(v.y), uintBitsToFloat(v.z)); }
 CM_FN uint bitfieldReverse(uint x) { return __brev(x); }
 CM_FN uint bitfieldExtract(uint value, int offset, int bits) { return (value >> offset) & ((1u << bits) - 1u); }
 CM_FN void umulExtended(uint a, uint b, uint& high, uint& low) {

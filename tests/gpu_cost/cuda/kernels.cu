@@ -130,4 +130,49 @@ extern "C" __global__ void __launch_bounds__(64) cm_cost_store() {
   cm_store_path(p);
 }
 
+// Two paths a lane, with the lists and counters of path_store.glsl.
+#include "path/path_blocks.glsl"
+#define shared __shared__
+#define barrier __syncthreads
+#define memoryBarrierBuffer __threadfence_block
+#define gl_LocalInvocationIndex threadIdx.x
+#define gl_WorkGroupID blockIdx
+__device__ uint4 cm_total;
+__device__ uint4 cm_running;
+__device__ uint4 cm_blocks[CM_MAX_BLOCKS];
+__device__ uint cm_active_counts[CM_LISTS * CM_MAX_BLOCKS];
+__device__ uint* cm_slot_words;
+__device__ uvec4* cm_paths;
+CM_FN uint cm_atomic_add(uint& sum, uint value) { return ::atomicAdd(&sum, value); }
+#define atomicAdd cm_atomic_add
+CM_FN uint cm_lanes() { return cm.dispatch.lanes; }
+CM_FN uint cm_block() { return bitfieldExtract(cm_blocks[blockIdx.y].x, 0, CM_LIST_BIT); }
+CM_FN bool cm_block_begins() { return (cm_blocks[blockIdx.y].x & CM_BEGINS) != 0u; }
+CM_FN uint cm_block_of(uint lane) { return lane / CM_BLOCK_LANES; }
+CM_FN uint cm_list(uint ahead) {
+  return (bitfieldExtract(cm_blocks[blockIdx.y].x, CM_LIST_BIT, 2) + ahead) % CM_LISTS;
+}
+CM_FN uint cm_list_at(uint list) { return cm.dispatch.slots + list * cm_lanes() + cm_block() * CM_BLOCK_LANES; }
+CM_FN void cm_join_ranks(uint lane) {
+  const uint rank = atomicAdd(cm_active_counts[cm_list(1u) * CM_MAX_BLOCKS + cm_block()], 1u);
+  cm_slot_words[cm_list_at(cm_list(1u)) + rank] = lane;
+}
+CM_FN void cm_count_group() {
+  if (threadIdx.x == 0u) atomicAdd(cm_running.z, 1u);
+}
+CM_FN CmPath cm_begin_path() {
+  CmPath p = {};
+  return p;
+}
+CM_FN CmPath cm_load_path(uint lane) { return cm_lane_paths[lane]; }
+CM_FN void cm_store_path(const CmPath& p, uint lane) { cm_lane_paths[lane] = p; }
+CM_FN uint cm_pixel_samples(uvec2 at) { return cm_load_pixel(at).samples; }
+CM_FN void cm_take_slot(CmPath& p, uint slot, uint& samples) {
+  p.slot = slot;
+  p.stage = slot < cm.dispatch.slots ? CM_STAGE_CAMERA : CM_STAGE_DONE;
+  samples = 0u;
+}
+#include "../../bench/two_paths/path/two_paths.glsl"
+extern "C" __global__ void __launch_bounds__(32) cm_cost_two_paths() { cm_two_paths(); }
+
 }  // namespace cumulet::core
