@@ -17,7 +17,8 @@ def test_volumes(s):
     camera = {"eye": [20, 30, 170], "target": [20, 20, 0]}
     volumes = [{"file": s.cumulus, **medium}, {"file": s.cumulus, **medium, **far}]
     (s.out / "two.json").write_text(json.dumps({"cumulet_scene": 2, "volumes": volumes, "camera": camera}))
-    there = ["wait loaded", "wait converged"]
+    # The pointer is away from controls in the images, so that no hint covers them.
+    there = ["move viewport 0.5 0.03", "frames 2", "wait loaded", "wait converged", "frames 2"]
     s.play("volumes",
            ["key q", *there, *shot("both"),
             'click "Eye/Volume 2"', *there, *shot("first"),
