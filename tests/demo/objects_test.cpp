@@ -67,17 +67,12 @@ TEST_P(ObjectsTest, TheMediumOfAnotherVolumeBeginsWithWhatItsFileSuggests) {
   EXPECT_FALSE(has("Max bounces")) << "the first volume's applies to all";
   EXPECT_TRUE(model_.scene.others[0].auto_density_scale);
   EXPECT_EQ(model_.scene.others[0].medium.density_scale, 0.0) << "to look at it changes nothing";
-  show("Phase function");
-  click("Phase function");
-  click("Phase function/Two lobes");
   const SceneVolume& other = model_.scene.others[0];
-  EXPECT_EQ(other.medium.phase, CUMULET_PHASE_TWO_LOBE);
-  EXPECT_EQ(other.medium.density_scale, 0.25);
-  EXPECT_FALSE(other.auto_density_scale);
   model_.scene.others[0].medium.density_scale = 7.0;
   show("Auto density");
   click("Auto density");
   EXPECT_EQ(other.medium.density_scale, 0.25);
+  EXPECT_FALSE(other.auto_density_scale);
   EXPECT_TRUE(commands_.empty()) << "the first volume stays";
 }
 

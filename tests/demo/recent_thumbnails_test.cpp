@@ -31,10 +31,9 @@ class RecentThumbnailsTest : public testing::Test {
     fs::permissions(path, fs::perms::owner_all);
     return path;
   }
-  static void finish(RecentThumbnails& thumbnails, const std::vector<std::string>& files) {
-    double now = 0.0;
+  void finish(RecentThumbnails& thumbnails, const std::vector<std::string>& files) {
     do {
-      thumbnails.follow(files, now += 10.0);
+      thumbnails.follow(files, now_ += 10.0);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     } while (thumbnails.works());
   }
@@ -46,6 +45,7 @@ class RecentThumbnailsTest : public testing::Test {
   }
 
   cumulet::test::Folder folder_;
+  double now_ = 0.0;  // seconds
   std::string cache_ = (folder_ / "cache/thumbnails").string();
 };
 
