@@ -64,7 +64,7 @@ std::optional<Box> box_of_others(const Model& model, const Item& item) {
 std::optional<Placement> place_in(const Box& scene, const Box& object, const dvec3& eye) {
   constexpr double max_ratio = 30.0;  // of sizes
   constexpr double max_gap = 3.0;     // relative to the larger size
-  constexpr double wanted = 0.3;       // size relative to the scene's
+  constexpr double wanted = 0.3;      // size relative to the scene's
   const double scene_size = size_of(scene);
   const double size = size_of(object);
   if (!(scene_size > 0.0 && size > 0.0)) return std::nullopt;
