@@ -1,13 +1,13 @@
 #include "exposure_meter.hpp"
 
 #include <cstddef>
-#include <suitable_exposure.hpp>
 #include <utility>
 #include <vector>
 
 namespace cumulet::demo {
 
-std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool complete, std::uint32_t flags) {
+std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool complete, std::uint32_t flags,
+                                             image::Curve curve) {
   if ((flags & (CUMULET_RENDER_NEW_IMAGE | CUMULET_RENDER_CONVERGED)) != 0) fresh_ = true;
   if (turns_ && complete && fresh_) {
     // Each of these frames begins a read, so that reads() asks for the next one. The last read counts.
@@ -30,7 +30,7 @@ std::optional<Metered> ExposureMeter::follow(cumulet_viewer* viewer, bool comple
   std::vector<float> rgba(std::size_t{info.channels} * info.width * info.height);
   const std::uint64_t read = std::exchange(read_, 0);
   if (cumulet_finish_read(viewer, read, rgba.data(), rgba.size(), &info) != CUMULET_OK) return std::nullopt;
-  return Metered{image::suitable_exposure(rgba, info.width, info.height)};
+  return Metered{image::suitable_exposure(rgba, info.width, info.height, curve)};
 }
 
 }  // namespace cumulet::demo

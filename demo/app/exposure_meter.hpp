@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <suitable_exposure.hpp>
 
 namespace cumulet::demo {
 
@@ -23,9 +24,10 @@ class ExposureMeter {
   }
   /// Returns true while the viewer's values are being copied, which more frames or calls of follow() must await.
   [[nodiscard]] bool reads() const { return read_ != 0; }
-  /// Call once per frame. complete: the image shows the whole scene. flags: CUMULET_RENDER_* bits of the frame. Returns
-  /// the requested measurement once, of an image that has the settings of the request.
-  [[nodiscard]] std::optional<Metered> follow(cumulet_viewer* viewer, bool complete, std::uint32_t flags);
+  /// Call once per frame. complete: the image shows the whole scene. flags: CUMULET_RENDER_* bits of the frame. curve:
+  /// of the display. Returns the requested measurement once, of an image that has the settings of the request.
+  [[nodiscard]] std::optional<Metered> follow(cumulet_viewer* viewer, bool complete, std::uint32_t flags,
+                                              image::Curve curve);
 
  private:
   // Complete frames with the new settings until the measured one.

@@ -551,7 +551,9 @@ void Session::measure_exposure() {
       (frame.flags & CUMULET_RENDER_PREVIEW) != 0 && (!surfaces_.shown.empty() || !scene_.models.empty());
   const bool complete = !waits() && !status_.busy && !preview && frame.width > 0 && frame.progress > 0.0 &&
                         scene_.sampling.view == CUMULET_VIEW_SHADED;
-  if (auto metered = meter_.follow(viewer_.get(), complete, frame.flags)) events_.metered = *metered;
+  const image::Curve curve =
+      scene_.display.tone_map == CUMULET_TONE_MAP_FILMIC ? image::Curve::filmic : image::Curve::neutral;
+  if (auto metered = meter_.follow(viewer_.get(), complete, frame.flags, curve)) events_.metered = *metered;
 }
 
 // Measures the noise once per second while the image refines.

@@ -12,13 +12,20 @@ namespace {
 
 constexpr std::uint32_t blocks_across = 24;  // few, so that the noise of the first samples is averaged
 constexpr double gray = 0.18;
-constexpr double darkest = 1e-3;  // of the highlights; darker blocks count as that
-// Exposed luminance of the highlights, each in a quantile of the blocks. Above the limit the filmic curve turns orange
-// flames to pale yellow. Fires are small, and the glare around the sun is still smaller.
-constexpr double dimmest_highlight = 0.6;
-constexpr double dim_quantile = 0.97;
-constexpr double brightest_highlight = 1.2;
-constexpr double bright_quantile = 0.98;
+constexpr double darkest = 1e-3;           // of the highlights; darker blocks count as that
+constexpr double dimmest_highlight = 0.6;  // exposed luminance of the highlights
+constexpr double dim_quantile = 0.97;      // of the blocks
+
+/// The exposed luminance that the highlights may have, and their quantile of the blocks.
+struct Limit {
+  double luminance = 0.0;
+  double quantile = 0.0;
+};
+
+// Above the second limit the filmic curve turns orange flames to pale yellow. Fires are small, and the glare around the
+// sun is still smaller.
+Limit limit_of(Curve curve) { return curve == Curve::filmic ? Limit{1.2, 0.98} : Limit{2.0, 0.97}; }
+
 constexpr double max_stops = 20.0;
 
 /// Returns the mean luminances of square blocks of the image, without those that are not finite.
@@ -47,19 +54,21 @@ double highlight(const std::vector<double>& luminances, double quantile) {
 
 }  // namespace
 
-std::optional<float> suitable_exposure(std::span<const float> rgba, std::uint32_t width, std::uint32_t height) {
+std::optional<float> suitable_exposure(std::span<const float> rgba, std::uint32_t width, std::uint32_t height,
+                                       Curve curve) {
   std::vector<double> luminances = block_luminances(rgba, width, height);
   if (luminances.empty()) return std::nullopt;
   std::ranges::sort(luminances);
   const double dim = highlight(luminances, dim_quantile);
-  const double bright = highlight(luminances, bright_quantile);
+  const Limit limit = limit_of(curve);
+  const double bright = highlight(luminances, limit.quantile);
   if (!(dim > 0.0)) return std::nullopt;
   double logs = 0.0;
   for (const double luminance : luminances) logs += std::log2(std::max(luminance, darkest * dim));
   const double middle = std::log2(gray) - logs / static_cast<double>(luminances.size());
   // Where both limits exclude each other, nothing burns out.
   const double stops =
-      std::min(std::max(middle, std::log2(dimmest_highlight / dim)), std::log2(brightest_highlight / bright));
+      std::min(std::max(middle, std::log2(dimmest_highlight / dim)), std::log2(limit.luminance / bright));
   return static_cast<float>(std::round(10.0 * std::clamp(stops, -max_stops, max_stops)) / 10.0);
 }
 

@@ -64,8 +64,8 @@ void FireLook::expose(const Viewer& viewer, const RenderOptions& options, const 
     read.resize(std::size_t{4} * options.scene.width * options.scene.height);
     check(viewer, cumulet_read_linear(viewer.get(), read.data(), read.size()));
   }
-  const auto stops =
-      image::suitable_exposure(denoised.empty() ? read : denoised, options.scene.width, options.scene.height);
+  const auto stops = image::suitable_exposure(denoised.empty() ? read : denoised, options.scene.width,
+                                              options.scene.height, image::Curve::filmic);
   const bool is_close = !stops || std::abs(*stops - dusk_exposure) < exposure_tolerance;
   dusk_->display.exposure_stops = is_close ? dusk_exposure : *stops;
   set_display(viewer, dusk_->display);

@@ -153,8 +153,8 @@ def test_handles(s):
 
 
 def test_timeline(s):
-    """A numbered file is a single frame until the user makes it a sequence. The sequence is stepped, played, scrubbed,
-    trimmed and saved."""
+    """A numbered file is a single frame until the user makes it a sequence, which plays once. The sequence is stepped,
+    played, scrubbed, trimmed and saved."""
     frames = [f"fire_{number:02}.vdb" for number in range(3, 9)]
     for number, name in enumerate(frames):
         # Frame 3 is the explosion, 4 is missing, 5 the cloud, 6 corrupt, 7 the explosion, 8 the cloud.
@@ -166,8 +166,8 @@ def test_timeline(s):
     quick = ["--spp", "2", "--albedo", "0.5,0.5,0.5", "--max-bounces", "2"]
     size = ["--size", "640x260"]
     s.play("timeline",
-           [*there, *shot("alone"), *tab("Sequence"), 'click "Play the sequence"', *there, *shot("opened"),
-            "key .", *there, *shot("next"), "key ,", "key ,", *there, *shot("missing"),
+           [*there, *shot("alone"), *tab("Sequence"), 'click "Play the sequence"', "frames 30", *there, *shot("opened"),
+            "key ,", "key ,", "key ,", *there, "key .", *there, *shot("next"), "key ,", "key ,", *there, *shot("missing"),
             "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Repeat"', "frames 2",
             'click "Repeat/Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
             'click "Playhead" 0.99 0.5', "key escape", "key escape", *there, *shot("scrubbed"), "key ctrl+s", "frames 2", "key ctrl+a",
@@ -176,16 +176,15 @@ def test_timeline(s):
            "fire_05.vdb", *quick, size=size)
     alone, opened, following, missing = (s.report(name) for name in ("alone", "opened", "next", "missing"))
     assert "sequence" not in alone and alone["neighbours"] == 6, alone
-    assert opened["sequence"]["frame"] == opened["sequence"]["drawn"] == 5, opened["sequence"]
+    assert opened["sequence"]["frame"] == opened["sequence"]["drawn"] == 8, opened["sequence"]
+    assert opened["sequence"]["clock"] > 0.0 and not opened["sequence"]["playing"], opened["sequence"]
     assert opened["sequence"]["first"] == 3 and opened["sequence"]["count"] == 6, opened["sequence"]
     assert opened["viewport"][3] < alone["viewport"][3], "the timeline is below the picture"
     assert following["sequence"]["frame"] == 6 and following["sequence"]["drawn"] == 5, "the one before stands in"
     assert "fire_06.vdb" in following["sequence"]["failure"], following["sequence"]
     assert missing["sequence"]["frame"] == 4 and missing["sequence"]["drawn"] == 3, missing["sequence"]
     assert missing["sequence"]["ready"] == 4 and missing["sequence"]["failed"] == 2, missing["sequence"]
-    told = [m["text"] for m in opened["messages"] + following["messages"] + missing["messages"]]
-    for name in ("fire_04.vdb", "fire_06.vdb"):
-        assert any(name in text for text in told), told
+    assert any("fire_04.vdb" in message["text"] for message in opened["messages"]), opened["messages"]
     assert s.report("undone")["sequence"]["last_played"] is None, "the range is undone"
     assert s.report("undone")["sequence"]["frame"] == 4, "and the playhead is not"
     playing = s.report("playing")["sequence"]

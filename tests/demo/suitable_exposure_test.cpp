@@ -15,6 +15,7 @@
 namespace {
 
 using namespace cumulet::demo;
+using cumulet::image::Curve;
 using cumulet::image::suitable_exposure;
 
 constexpr std::uint32_t width = 96;
@@ -30,8 +31,8 @@ std::vector<float> picture(float upper, float lower, double part) {
   return rgba;
 }
 
-float stops_of(const std::vector<float>& rgba) {
-  const auto stops = suitable_exposure(rgba, width, height);
+float stops_of(const std::vector<float>& rgba, Curve curve = Curve::filmic) {
+  const auto stops = suitable_exposure(rgba, width, height, curve);
   EXPECT_TRUE(stops.has_value());
   return stops.value_or(0.0f);
 }
@@ -52,6 +53,8 @@ TEST(AutoExposure, FollowsTheLuminance) {
 TEST(AutoExposure, HighlightsStayInRange) {
   const float glow = stops_of(picture(10.0f, 1e-4f, 0.2));
   EXPECT_NEAR(10.0f * std::exp2(glow), 1.2f, 0.1f) << "not burned out";
+  const float cloud = stops_of(picture(10.0f, 1e-4f, 0.2), Curve::neutral);
+  EXPECT_NEAR(10.0f * std::exp2(cloud), 2.0f, 0.1f) << "clouds stay white";
   const float snow = stops_of(picture(3.0f, 3.0f, 0.5));
   EXPECT_NEAR(3.0f * std::exp2(snow), 0.6f, 0.05f) << "not gray";
 }
@@ -77,14 +80,14 @@ TEST(AutoExposure, SmallFlameBeforeBlackCounts) {
 }
 
 TEST(AutoExposure, BlackImageHasNone) {
-  EXPECT_FALSE(suitable_exposure(picture(0.0f, 0.0f, 0.5), width, height));
-  EXPECT_FALSE(suitable_exposure({}, 0, 0));
+  EXPECT_FALSE(suitable_exposure(picture(0.0f, 0.0f, 0.5), width, height, Curve::neutral));
+  EXPECT_FALSE(suitable_exposure({}, 0, 0, Curve::neutral));
   std::vector<float> rgba = picture(0.5f, 0.1f, 0.5);
   const float stops = stops_of(rgba);
   rgba[4 * 1000] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_NEAR(stops_of(rgba), stops, 0.11f);
   for (float& value : rgba) value = std::numeric_limits<float>::infinity();
-  EXPECT_FALSE(suitable_exposure(rgba, width, height));
+  EXPECT_FALSE(suitable_exposure(rgba, width, height, Curve::neutral));
 }
 
 TEST(AutoExposure, KeepsAnExposureThatWasSet) {
