@@ -7,7 +7,7 @@
 namespace cumulet::demo {
 
 /// Receives the signals by which a desktop or a terminal ends a program: SIGTERM, SIGINT and SIGHUP. The program can
-/// then store what the next start needs. One object at a time.
+/// then store the state for the next start. One object at a time.
 class EndSignals {
  public:
   /// wake: called in another thread after the first signal. A second one ends the program as usual. Throws

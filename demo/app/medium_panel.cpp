@@ -44,7 +44,7 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
   const OtherVolume* const other = first ? nullptr : find_other(model.status, volume);
   static const Fields unknown;
   const Fields& fields = first ? model.status.fields : other != nullptr ? other->fields : unknown;
-  // What another volume's file suggests becomes the scene's when the user changes it.
+  // The file of another volume suggests values. They become the scene's when the user changes one.
   const Desc before = other != nullptr ? medium_of(volume, other->open) : volume.medium;
   Desc medium = before;
   std::vector<Choice> presets;

@@ -36,7 +36,7 @@ std::string print(const char* format, Values... values) {
   return text.data();
 }
 
-/// Returns a format that prints an hour as a clock does: "14:12 (14.20 h)". The number is what the user can type.
+/// Returns a format that prints an hour as a clock does: "14:12 (14.20 h)". The user can type the number.
 std::string clock_text(double hour) {
   const auto minutes = static_cast<int>(std::lround(hour * 60.0));
   return print("%d:%02d", minutes / 60, minutes % 60) + "  (%.2f h)";

@@ -24,8 +24,8 @@ class RecentThumbnails {
   /// Ends the program if it runs.
   ~RecentThumbnails();
 
-  /// Begins the next missing thumbnail of these files. Call it repeatedly. It looks for changed files once per second.
-  /// now: in seconds. Returns true if thumbnails may have changed since the last call.
+  /// Begins the next missing thumbnail of these files. Call it repeatedly. It checks once per second whether files have
+  /// changed. now: in seconds. Returns true if thumbnails may have changed since the last call.
   bool follow(std::span<const std::string> files, double now);
   /// Ends the current thumbnail's rendering, for example because the user has opened a file. It is begun again later.
   void stop();

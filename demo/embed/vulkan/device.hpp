@@ -97,7 +97,7 @@ class Device {
 
   /// Commands to be recorded for each frame. They end with the device.
   [[nodiscard]] VkCommandBuffer create_commands() const;
-  /// Discards what was recorded.
+  /// Begins a recording, in place of an earlier one.
   static void begin(VkCommandBuffer commands);
   /// Ends the recording and submits it. VK_NULL_HANDLE is no semaphore.
   void submit(VkCommandBuffer commands, VkSemaphore wait_for, VkSemaphore signal) const;

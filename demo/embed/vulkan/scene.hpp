@@ -15,7 +15,7 @@ struct Box {
   std::array<float, 4> color{};
 };
 
-/// What Vulkan draws: opaque boxes, their depth as an image for the viewer, and the viewer's image over the boxes.
+/// The drawing by Vulkan: opaque boxes, their depth as an image for the viewer, and the viewer's image over the boxes.
 class Scene {
  public:
   Scene(const Device& device, VkExtent2D size);
