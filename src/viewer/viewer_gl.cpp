@@ -239,13 +239,15 @@ void Viewer::take_state(const Frame& frame, Shot& shot, Context::UploadLimits& l
 
 void Viewer::finish_frame(Context& g, FrameResult& result) {
   const std::uint64_t beside_volumes = g.bytes() - g.read_bytes() - g.scene().data_bytes() - g.scene().passing_bytes();
-  const bool gl_due = g.transfers().busy() || dynamic_gl_.is_due(g);
-  const StateLock::Held held = hold_state();
-  take_frames();
-  stage_.volumes.take_gl_bytes(beside_volumes);
-  stage_.volumes.note_displayed(frames_->shown);
-  report_pending(result);
-  if (gl_due) {
+  {
+    const StateLock::Held held = hold_state();
+    take_frames();
+    stage_.volumes.take_gl_bytes(beside_volumes);
+    stage_.volumes.note_displayed(frames_->shown);
+    report_pending(result);
+  }
+  // After the workers were asked whether they are busy: one that has just ended may have requested voxels from GL.
+  if (g.transfers().busy() || dynamic_gl_.is_due(g)) {
     result.more = true;
     result.converged = false;
   }
