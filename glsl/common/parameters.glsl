@@ -38,6 +38,10 @@
 #ifndef CM_EXTENDED_BSDF
 #define CM_EXTENDED_BSDF 0
 #endif
+// 1 if some surfaces let rays pass straight on (cm_bsdf_passes): needs CM_EXTENDED_BSDF.
+#ifndef CM_CLEAR_SURFACES
+#define CM_CLEAR_SURFACES 0
+#endif
 // 1 if radiance is also summed by light group (glsl/path/groups.glsl).
 #ifndef CM_GROUPS
 #define CM_GROUPS 0
@@ -178,7 +182,7 @@ CM_BLOCK(CmSurfaceTables) {
   uint ggx_albedo;  // word index of the table of src/surface/ggx_albedo.hpp
   uint ggx_albedo_averages;
   uint sheen_albedo;   // word index of the table of src/surface/sheen_albedo.hpp
-  uint extended_bsdf;  // 1: some materials need CM_EXTENDED_BSDF, and paths keep CM_PATH_WITHIN
+  uint extended_bsdf;  // the CM_EXTENDED_BSDF that the materials need; above 0 paths keep CM_PATH_WITHIN
   CM_EQUALITY(CmSurfaceTables)
 };
 

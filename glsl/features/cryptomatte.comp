@@ -36,46 +36,94 @@ const uint CM_MATTE_OF_VOLUMES = 1u;
 
 // Maximum number of IDs per pixel.
 const uint CM_MAX_MATTES = 32u;
-uint cm_matte_id[CM_MAX_MATTES];
-float cm_matte_share[CM_MAX_MATTES];
+// The image itself holds a pixel's IDs, as float bits, and the sums of their coverage. Compilers for AMD turn an index
+// into a private array into branches, which were most of this kernel.
+ivec2 cm_matte_texel;
 uint cm_matte_count = 0u;
-uint cm_matte_last = 0u;  // the slot used last: the next contribution is mostly to the same ID
+// The ID added to last is in registers, because the next contribution is mostly to the same one. 0: none.
+uint cm_matte_slot = 0u;
+uint cm_matte_id = 0u;
+float cm_matte_share = 0.0;
 
-// Returns the slot of an ID. If all slots are in use, the one with the smallest coverage is replaced.
-uint cm_matte_slot(uint id) {
+vec2 cm_load_matte(uint slot) {
+  vec4 pairs = imageLoad(cm_mattes, ivec3(cm_matte_texel, int(slot / 2u)));
+  return (slot & 1u) == 0u ? pairs.xy : pairs.zw;
+}
+
+void cm_store_matte(uint slot, vec2 matte) {
+  ivec3 at = ivec3(cm_matte_texel, int(slot / 2u));
+  vec4 pairs = imageLoad(cm_mattes, at);
+  imageStore(cm_mattes, at, (slot & 1u) == 0u ? vec4(matte, pairs.zw) : vec4(pairs.xy, matte));
+}
+
+void cm_store_last_matte() {
+  if (cm_matte_id != 0u) cm_store_matte(cm_matte_slot, vec2(uintBitsToFloat(cm_matte_id), cm_matte_share));
+}
+
+// Loads an ID and its sum into the registers. If all slots are in use, the one with the smallest coverage is replaced.
+void cm_select_matte(uint id) {
+  cm_store_last_matte();
   uint slot = 0u;
-  while (slot < cm_matte_count && cm_matte_id[slot] != id) slot += 1u;
-  if (slot < cm_matte_count) return slot;
-  if (slot == CM_MAX_MATTES) {
+  while (slot < cm_matte_count && floatBitsToUint(cm_load_matte(slot).x) != id) slot += 1u;
+  float share = 0.0;
+  if (slot < cm_matte_count) {
+    share = cm_load_matte(slot).y;
+  } else if (slot < CM_MAX_MATTES) {
+    cm_matte_count += 1u;
+  } else {
     slot = 0u;
     for (uint i = 1u; i < CM_MAX_MATTES; ++i) {
-      if (cm_matte_share[i] < cm_matte_share[slot]) slot = i;
+      if (cm_load_matte(i).y < cm_load_matte(slot).y) slot = i;
     }
-  } else {
-    cm_matte_count += 1u;
   }
-  cm_matte_id[slot] = id;
-  cm_matte_share[slot] = 0.0;
-  return slot;
+  cm_matte_slot = slot;
+  cm_matte_id = id;
+  cm_matte_share = share;
 }
 
 void cm_add_to_matte(uint id, float share) {
   if (id == 0u || !(share > 0.0)) return;
-  bool again = cm_matte_last < cm_matte_count && cm_matte_id[cm_matte_last] == id;
-  if (!again) cm_matte_last = cm_matte_slot(id);
-  cm_matte_share[cm_matte_last] += share;
+  if (id != cm_matte_id) cm_select_matte(id);
+  cm_matte_share += share;
 }
 
-// Removes the slot with the largest coverage. Returns its ID, as a float's bits, and its coverage.
-vec2 cm_take_largest_matte() {
-  uint largest = 0u;
-  for (uint i = 1u; i < cm_matte_count; ++i) {
-    if (cm_matte_share[i] > cm_matte_share[largest]) largest = i;
+// Loads the sums of earlier dispatches: coverage times their number of rays.
+void cm_load_mattes(float rays) {
+  const int slices = int(CM_MAX_MATTES / 2u);
+  bool more = rays > 0.0;
+  for (int slice = 0; slice < slices && more; ++slice) {
+    vec4 pairs = imageLoad(cm_mattes, ivec3(cm_matte_texel, slice));
+    imageStore(cm_mattes, ivec3(cm_matte_texel, slice), vec4(pairs.x, rays * pairs.y, pairs.z, rays * pairs.w));
+    more = pairs.w > 0.0;
+    cm_matte_count += more ? 2u : pairs.y > 0.0 ? 1u : 0u;
   }
-  if (cm_matte_count == 0u || !(cm_matte_share[largest] > 0.0)) return vec2(0.0);
-  vec2 rank = vec2(uintBitsToFloat(cm_matte_id[largest]), cm_matte_share[largest]);
-  cm_matte_share[largest] = 0.0;
-  return rank;
+}
+
+// Sorts the IDs by coverage, the largest first, and keeps the order of equal ones.
+void cm_sort_mattes() {
+  for (uint i = 1u; i < cm_matte_count; ++i) {
+    vec2 matte = cm_load_matte(i);
+    uint slot = i;
+    while (slot > 0u && cm_load_matte(slot - 1u).y < matte.y) {
+      cm_store_matte(slot, cm_load_matte(slot - 1u));
+      slot -= 1u;
+    }
+    if (slot < i) cm_store_matte(slot, matte);
+  }
+}
+
+// Divides the sums by the number of rays, and ends the list with a coverage of 0.
+void cm_finish_mattes(float rays) {
+  float share = 1.0 / rays;
+  bool more = true;
+  for (uint slot = 0u; slot < CM_MAX_MATTES && more; slot += 2u) {
+    ivec3 at = ivec3(cm_matte_texel, int(slot / 2u));
+    vec4 pairs = imageLoad(cm_mattes, at);
+    if (slot >= cm_matte_count) pairs.xy = vec2(0.0);
+    if (slot + 1u >= cm_matte_count) pairs.zw = vec2(0.0);
+    imageStore(cm_mattes, at, vec4(pairs.x, share * pairs.y, pairs.z, share * pairs.w));
+    more = pairs.w > 0.0;
+  }
 }
 
 void main() {
@@ -83,18 +131,8 @@ void main() {
   if (local.x >= cm.dispatch.tile_size.x || local.y >= cm.dispatch.rows.y) return;
   uvec2 pixel = cm.dispatch.tile_corner + local;
   uint first_model = CM_MATTE_OF_VOLUMES + max(cm.space.volumes, 1u);
-  const int slices = int(CM_MAX_MATTES / 2u);
-  float before = float(cm.dispatch.rays_before);
-  bool more = before > 0.0;
-  for (int slice = 0; slice < slices && more; ++slice) {
-    vec4 pairs = imageLoad(cm_mattes, ivec3(ivec2(local), slice));
-    more = pairs.w > 0.0;
-    cm_matte_id[2 * slice] = floatBitsToUint(pairs.x);
-    cm_matte_share[2 * slice] = before * pairs.y;
-    cm_matte_id[2 * slice + 1] = floatBitsToUint(pairs.z);
-    cm_matte_share[2 * slice + 1] = before * pairs.w;
-    cm_matte_count += more ? 2u : pairs.y > 0.0 ? 1u : 0u;
-  }
+  cm_matte_texel = ivec2(local);
+  cm_load_mattes(float(cm.dispatch.rays_before));
   for (int i = int(cm.dispatch.rays_before); i < int(cm.dispatch.samples); ++i) {
     CmFeatureRay ray = cm_feature_ray(pixel, i);
     float solid_t = ray.end;
@@ -138,12 +176,7 @@ void main() {
     }
     cm_add_to_matte(solid, exp(-used));
   }
-  float share = 1.0 / float(cm.dispatch.samples);
-  more = true;
-  for (int slice = 0; slice < slices && more; ++slice) {
-    vec2 first = cm_take_largest_matte();
-    vec2 second = cm_take_largest_matte();
-    imageStore(cm_mattes, ivec3(ivec2(local), slice), vec4(first.x, share * first.y, second.x, share * second.y));
-    more = second.y > 0.0;
-  }
+  cm_store_last_matte();
+  cm_sort_mattes();
+  cm_finish_mattes(float(cm.dispatch.samples));
 }

@@ -267,7 +267,7 @@ CM_FN void cm_intersect(CM_INOUT(CmPath) p) {
   cm_hit_camera = scattered && p.bounces == 0u;
   CmHit hit;
   float reach = !first && p.event == CM_EVENT_COLLISION ? p.t : p.reach;
-#if CM_EXTENDED_BSDF
+#if CM_CLEAR_SURFACES
   cm_hit_direction = normalize(d);
   bool is_hit = false;
   // Camera and scattered rays are traced again up to their hit: on the way to it the BVH also visited surfaces behind
@@ -284,9 +284,11 @@ CM_FN void cm_intersect(CM_INOUT(CmPath) p) {
   }
   if (scattered) p.throughput *= cm_hit_passed;
   if (!scattered || p.bounces == 0u) p.light *= cm_hit_passed;
-  cm_absorb(p, is_hit, hit);
 #else
   bool is_hit = cm_trace_models(o, d, 0.0f, reach, !scattered, hit);
+#endif
+#if CM_EXTENDED_BSDF
+  cm_absorb(p, is_hit, hit);
 #endif
   if (is_hit && !scattered) p.event = CM_EVENT_COLLISION;
   if (is_hit && scattered) {

@@ -1,7 +1,7 @@
 #version 450
 // Intersects queued rays with the triangles: glsl/path/path_queue.glsl.
 // variants: CM_SURFACES=1
-// variants: - or CM_EXTENDED_BSDF=1
+// variants: - or CM_EXTENDED_BSDF=1 or CM_CLEAR_SURFACES=1 CM_EXTENDED_BSDF=1,2
 // variants: - or CM_GROUPS=1
 // variants: - or CM_MOTION=1
 layout(local_size_x = 8, local_size_y = 8) in;

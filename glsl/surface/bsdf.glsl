@@ -1,5 +1,5 @@
 // The BSDF: the metallic-roughness material of glTF 2.0 (appendix B) with KHR_materials_ior, _specular and _clearcoat.
-// With CM_EXTENDED_BSDF also _transmission, _volume, _dispersion, _sheen, _anisotropy and _iridescence
+// With CM_EXTENDED_BSDF also _transmission, _volume, _dispersion, _sheen and _anisotropy, with 2 also _iridescence
 // (glsl/surface/film.glsl, glsl/surface/sheen.glsl). Shared by GLSL and C++. The includer provides before this
 //   vec2 cm_ggx_albedo(float roughness, float cosine)
 //   vec2 cm_ggx_albedo_average(float roughness)
@@ -101,8 +101,10 @@ CM_FN vec3 cm_interface_fresnel_of(CmSurface s, vec3 f0, float f90, float cosine
     cosine = sqrt(1.0f - sine2);
   }
   vec3 f = f0 + (vec3(f90) - f0) * cm_schlick(cosine);
+#if CM_EXTENDED_BSDF > 1
   float film = cm_film_share(s.film);
   if (film > 0.0f) f = mix(f, cm_film_fresnel(s.film, f0, cosine), film);
+#endif
   return f;
 }
 CM_FN vec3 cm_base_fresnel(CmSurface s, float cosine) {
@@ -114,9 +116,13 @@ CM_FN float cm_dielectric_fresnel(CmSurface s, float cosine) {
 
 // Reflectance added by a thin film on the dielectric interface, towards a cosine and on average.
 CM_FN float cm_film_adds(CmSurface s, float cosine) {
+#if CM_EXTENDED_BSDF > 1
   if (!(s.film.weight > 0.0f)) return 0.0f;
   float f0 = cm_max3(s.f0);
   return cm_dielectric_fresnel(s, cosine) - (f0 + (s.specular - f0) * cm_schlick(cosine));
+#else
+  return 0.0f;
+#endif
 }
 CM_FN float cm_film_average(CmSurface s) {
   // Gauss-Legendre quadrature over the squared cosine.

@@ -4,7 +4,8 @@
 #define CM_GGX_GLSL
 
 // 1 for the extended-material variant, which has more than reflecting lobes of one roughness: the extensions listed
-// second in glsl/surface/bsdf.glsl. It is a variant, so that scenes without them do not pay for it.
+// second in glsl/surface/bsdf.glsl, but for iridescence. 2 for all. They are variants, so that scenes without them do
+// not pay for them. Thin films are half of the code of a kernel that has them.
 #ifndef CM_EXTENDED_BSDF
 #define CM_EXTENDED_BSDF 0
 #endif

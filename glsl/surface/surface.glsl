@@ -44,7 +44,7 @@ CM_FN uvec4 cm_bvh_triangle(uint texel) {
 // Properties of the current ray, for cm_hit_accept.
 uint cm_hit_seed = 0u;
 bool cm_hit_camera = false;
-#if CM_EXTENDED_BSDF
+#if CM_CLEAR_SURFACES
 vec3 cm_hit_direction = vec3(0.0f);  // world, unit
 vec3 cm_hit_passed = vec3(1.0f);     // transmittance over pass probability of the clear surfaces passed so far
 #endif
@@ -486,7 +486,7 @@ CM_FN CmSurfacePoint cm_surface_point(uint triangle, vec2 weights, vec3 w, bool 
 CM_FN bool cm_hit_accept(uint triangle, vec2 weights) {
   float solid = cm_coverage(cm_vertex_mix(cm_model, triangle, weights));
   uint number = cm_models[cm_model].first + triangle;
-#if CM_EXTENDED_BSDF
+#if CM_CLEAR_SURFACES
   float u = cm_unit_float(cm_hash3(uvec3(cm_hit_seed, number, 0x68bc21ebu)).x);
   if (u >= solid) return false;
   CmSurfacePoint point = cm_surface_point(number, weights, cm_hit_direction, false);

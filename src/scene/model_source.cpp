@@ -136,13 +136,14 @@ std::uint32_t pack_vertices(std::vector<uvec4>& words, const surface::Scene& sce
   return first;
 }
 
-bool draws_extended_bsdf(const surface::Scene& scene, const surface::Pose& pose) {
+void find_visible_lobes(ModelSource& source) {
+  const surface::Scene& scene = *source.scene;
   for (std::size_t d = 0; d < scene.draws.size(); ++d) {
-    if (surface::is_hidden(pose, d)) continue;
-    if (surface::has_extended_bsdf(surface::materials_of(scene, pose)[surface::material_of(scene, pose, d)]))
-      return true;
+    if (surface::is_hidden(source.pose, d)) continue;
+    const Material& material = surface::materials_of(scene, source.pose)[surface::material_of(scene, source.pose, d)];
+    source.bsdf = std::max(source.bsdf, surface::bsdf_variant(material));
+    source.clear_surfaces = source.clear_surfaces || surface::may_be_clear(material);
   }
-  return false;
 }
 
 void pack_emitters(ModelSource& source, ModelMesh& mesh, const Progress* progress) {
@@ -184,7 +185,7 @@ void pack_words(ModelSource& source, const Progress* progress) {
   }
   check(progress);
   for (ModelMesh& mesh : source.meshes) pack_emitters(source, mesh, progress);
-  source.extended_bsdf = draws_extended_bsdf(scene, source.pose);
+  find_visible_lobes(source);
 }
 
 // The part of a per-triangle array (`each` elements per triangle) that belongs to the mesh.

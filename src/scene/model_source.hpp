@@ -60,8 +60,8 @@ struct ModelSource {
   std::vector<glm::uvec4> words;  ///< the tables of glsl/surface/surface.glsl, except textures
   std::uint32_t vertices = 0;     ///< offset of the vertices, which all meshes share
   std::uint32_t materials = 0;
-  bool extended_bsdf =
-      false;  ///< visible materials need the extended-material variant CM_EXTENDED_BSDF (glsl/surface/ggx.glsl)
+  surface::BsdfVariant bsdf = surface::BsdfVariant::basic;  ///< that all visible materials need
+  bool clear_surfaces = false;                              ///< some visible triangles are surface::may_be_clear()
   std::shared_ptr<const TextureImages> images;
   std::shared_ptr<const RasterSource> raster;
   std::vector<glm::vec3> centres;  ///< centers of the raster's blended triangles

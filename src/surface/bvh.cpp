@@ -667,8 +667,7 @@ std::vector<std::uint32_t> triangle_flags(const Scene& scene, const Pose& pose) 
     const Draw& draw = scene.draws[i];
     const Material& material = materials_of(scene, pose)[material_of(scene, pose, i)];
     std::uint32_t word = static_cast<std::uint32_t>(i) & TriangleFlags::user;
-    const bool clear = material.transmission > 0.0F && !bounds_volume(material);
-    if (material.alpha_mode != AlphaMode::opaque || clear) word |= TriangleFlags::ask;
+    if (material.alpha_mode != AlphaMode::opaque || may_be_clear(material)) word |= TriangleFlags::ask;
     if (!material.double_sided && !pose.double_sided && !bounds_volume(material)) word |= TriangleFlags::one_sided;
     if (i < pose.flipped.size() && pose.flipped[i] != 0) word |= TriangleFlags::clockwise;
     if (is_hidden(pose, i)) word |= TriangleFlags::left_out;

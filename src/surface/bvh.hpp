@@ -26,7 +26,7 @@ struct TriangleFlags {
 
 /// Returns the flags of a scene's triangles, in the order of Scene::indices.
 ///   - user bits: index of the Draw.
-///   - ask: AlphaMode::mask or blend, or transmission without a volume (bounds_volume()).
+///   - ask: AlphaMode::mask or blend, or may_be_clear().
 ///   - one_sided: neither the material nor the pose is double sided, and the material does not bound a volume.
 ///   - clockwise: the pose flips the draw.
 ///   - left_out: the pose hides the draw.

@@ -106,10 +106,18 @@ struct Material {
 /// Returns true if the triangles are the boundary of a volume that light enters by transmission (KHR_materials_volume).
 /// Both sides of such triangles are hit.
 inline bool bounds_volume(const Material& m) { return m.transmission > 0.0F && m.thickness > 0.0F && !m.unlit; }
-/// Returns true if the path tracer needs its extended-material variant (CM_EXTENDED_BSDF of glsl/surface/ggx.glsl).
-inline bool has_extended_bsdf(const Material& m) {
-  return !m.unlit &&
-         (m.transmission > 0.0F || m.sheen_color != glm::vec3(0.0F) || m.anisotropy > 0.0F || m.iridescence > 0.0F);
+/// Returns true if rays may pass straight on through the triangles, because they are thin walls that transmit. The
+/// fraction that passes is cm_bsdf_passes (glsl/surface/bsdf.glsl).
+inline bool may_be_clear(const Material& m) { return m.transmission > 0.0F && !bounds_volume(m) && !m.unlit; }
+/// The variants of the path tracer for materials. The values are those of CM_EXTENDED_BSDF (glsl/surface/ggx.glsl).
+/// Each has all lobes of those before it.
+enum class BsdfVariant : std::uint8_t { basic, extended, iridescent };
+/// Returns the first variant that has all lobes of the material.
+inline BsdfVariant bsdf_variant(const Material& m) {
+  if (m.unlit) return BsdfVariant::basic;
+  if (m.iridescence > 0.0F) return BsdfVariant::iridescent;
+  const bool extended = m.transmission > 0.0F || m.sheen_color != glm::vec3(0.0F) || m.anisotropy > 0.0F;
+  return extended ? BsdfVariant::extended : BsdfVariant::basic;
 }
 
 /// KHR_lights_punctual, in the scene's units: candela for point and spot lights, lux for directional ones. Cumulet

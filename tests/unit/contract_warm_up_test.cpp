@@ -224,9 +224,9 @@ std::vector<std::string> hollow_lines() {
   const char* const named = std::getenv("CUMULET_WHOLE_KERNELS");
   const std::string whole = ',' + std::string(named != nullptr ? named : "") + ',';
   std::vector<std::string> lines;
-  for (const std::string macro :
-       {"CM_CHANNELS 1", "CM_ENVIRONMENT 1", "CM_EQUIANGULAR 1", "CM_GROUPS 1", "CM_HOLDOUT 1", "CM_INSTANCES 1",
-        "CM_CLIP 1", "CM_ANALYTIC_LIGHTS 1", "CM_MOTION 1", "CM_EXTENDED_BSDF 1", "CM_SECOND_LOBE 1", "CM_GROUND 0"}) {
+  for (const std::string macro : {"CM_CHANNELS 1", "CM_ENVIRONMENT 1", "CM_EQUIANGULAR 1", "CM_GROUPS 1",
+                                  "CM_HOLDOUT 1", "CM_INSTANCES 1", "CM_CLIP 1", "CM_ANALYTIC_LIGHTS 1", "CM_MOTION 1",
+                                  "CM_EXTENDED_BSDF 1", "CM_EXTENDED_BSDF 2", "CM_SECOND_LOBE 1", "CM_GROUND 0"}) {
     if (whole.find(',' + macro.substr(0, macro.find(' ')) + ',') == std::string::npos)
       lines.push_back("#define " + macro);
   }

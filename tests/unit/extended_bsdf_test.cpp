@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#define CM_EXTENDED_BSDF 1
+#define CM_EXTENDED_BSDF 2
 #include "support/bsdf.hpp"
 
 namespace {

@@ -50,9 +50,10 @@ bool is_possible(const PathFeatures& f) {
   if (!f.ground_or_disk && (f.grid.several || f.layered != Layered::no || f.has_stages() || f.channels ||
                             f.analytic_lights || f.separate_volume_aov || f.light_groups > 0))
     return false;
-  if (!f.has_stages() && (f.extended_bsdf || f.model_holdout)) return false;
-  if (f.has_stages() && !emitting && (f.extended_bsdf || f.light_groups > 0)) return false;
-  return !f.equiangular || (f.analytic_lights && !f.separate_volume_aov && !f.extended_bsdf && !f.volume_holdout &&
+  if (f.clear_surfaces && f.extended_bsdf == 0) return false;
+  if (!f.has_stages() && (f.extended_bsdf > 0 || f.model_holdout)) return false;
+  if (f.has_stages() && !emitting && (f.extended_bsdf > 0 || f.light_groups > 0)) return false;
+  return !f.equiangular || (f.analytic_lights && !f.separate_volume_aov && f.extended_bsdf == 0 && !f.volume_holdout &&
                             !f.model_holdout && (f.has_stages() || f.layered == Layered::no));
 }
 
@@ -60,7 +61,7 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
   int pictures = 0;
   for (const bool several : {false, true}) {
     for (const PathTriangles triangles : {PathTriangles::none, PathTriangles::hit, PathTriangles::emitting}) {
-      for (unsigned bits = 0; bits < 1U << 15U; ++bits) {
+      for (unsigned bits = 0; bits < 1U << 17U; ++bits) {
         const auto bit = [&](unsigned i) { return (bits >> i & 1U) != 0; };
         PathFeatures features;
         features.grid = {March::dense, false, 1, false, several, false, bit(14)};
@@ -72,7 +73,8 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
         features.environment = bit(4);
         features.analytic_lights = bit(5);
         features.equiangular = bit(6);
-        features.extended_bsdf = bit(7);
+        features.extended_bsdf = bit(7) ? (bit(15) ? 2 : 1) : 0;
+        features.clear_surfaces = bit(16);
         features.volume_holdout = bit(8);
         features.model_holdout = bit(9);
         features.motion = bit(10);

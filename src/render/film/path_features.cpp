@@ -95,7 +95,10 @@ PathFeatures path_features(const MarchData& data, const PictureParameters& param
   features.channels = medium.emits != 0U || medium.colored != 0U || medium.anisotropic != 0U;
   features.environment = trace_inputs.environment != nullptr;
   features.analytic_lights = trace_inputs.analytic_light_count() > 0;
-  features.extended_bsdf = features.has_stages() && trace_inputs.traced_models()->tables().extended_bsdf != 0U;
+  if (features.has_stages()) {
+    features.extended_bsdf = trace_inputs.traced_models()->tables().extended_bsdf;
+    features.clear_surfaces = trace_inputs.traced_models()->clear_surfaces();
+  }
   features.volume_holdout = shaded && trace_inputs.volume_holdout;
   features.model_holdout = shaded && features.has_stages() && trace_inputs.model_holdout;
   features.motion = shaded && parameters.shutter.lasts != 0U;
@@ -104,7 +107,7 @@ PathFeatures path_features(const MarchData& data, const PictureParameters& param
   // light may lie before a surface. The color of a surface layer is stored in the same field as the light of such an
   // NEE sample. A holdout has no light.
   features.equiangular = features.analytic_lights && parameters.equiangular && !features.separate_volume_aov &&
-                         !features.extended_bsdf && !features.volume_holdout && !features.model_holdout &&
+                         features.extended_bsdf == 0 && !features.volume_holdout && !features.model_holdout &&
                          (features.has_stages() || features.layered == Layered::no);
   // To limit the number of variants, only the most frequent kernels have others for these.
   const bool plain = shaded && !options.preview && !features.grid.several && !features.has_stages() &&
@@ -153,9 +156,11 @@ StageKeys stage_keys(const PathFeatures& features) {
   if (features.equiangular) shade.push_back(macros::equiangular(1));
   if (features.model_holdout) shade.push_back(macros::holdout(1));
   Macros intersect{macros::surfaces(1)};
-  if (features.extended_bsdf) {
-    shade.push_back(macros::extended_bsdf(1));
-    intersect.push_back(macros::extended_bsdf(1));
+  if (features.extended_bsdf > 0) {
+    shade.push_back(macros::extended_bsdf(features.extended_bsdf));
+    // Only what passes through clear surfaces depends on thin films there.
+    intersect.push_back(macros::extended_bsdf(features.clear_surfaces ? features.extended_bsdf : 1));
+    if (features.clear_surfaces) intersect.push_back(macros::clear_surfaces(1));
   }
   Macros camera{macros::surfaces(1), macros::dense(0)};
   if (features.motion) {

@@ -45,7 +45,7 @@ std::uint32_t PathSampler::max_lanes(const PathFeatures& features) const {
 
 void PathSampler::reserve(const PathFeatures& features, const Accumulation& accumulation) {
   if (!kernels_.reserve(accumulation.lanes(), accumulation.slots(), features.has_stages(), features.grid.several,
-                        features.extended_bsdf, features.light_groups))
+                        features.extended_bsdf > 0, features.light_groups))
     paths_of_.reset();
 }
 
@@ -159,8 +159,7 @@ void PathSampler::dispatch(Picture& picture, const TraceInputs& trace_inputs, co
   Accumulation& accumulation = picture.accumulation();
   const std::shared_ptr<Blocks>& blocks = accumulation.blocks();
   core::CmParameters parameters = with_current_inputs(picture.parameters(), trace_inputs);
-  parameters.surfaces.extended_bsdf =
-      picture.features().extended_bsdf ? 1U : 0U;  // as there is memory for in the paths
+  parameters.surfaces.extended_bsdf = picture.features().extended_bsdf;  // as there is memory for in the paths
   parameters.dispatch.tile_corner = accumulation.tile_corner();
   parameters.dispatch.tile_size = accumulation.tile_extent();
   parameters.dispatch.rounds = what.rounds;

@@ -115,7 +115,8 @@ void ModelData::add_common(std::uint32_t first) {
   ggx_albedo_averages_ = here();
   common_.insert(common_.end(), averages.begin(), averages.end());
   sheen_albedo_ = here();
-  if (std::ranges::none_of(parts_, [](const Part& part) { return part.source->extended_bsdf; })) return;
+  const auto is_basic = [](const Part& part) { return part.source->bsdf == surface::BsdfVariant::basic; };
+  if (std::ranges::all_of(parts_, is_basic)) return;
   const std::vector<glm::uvec4> sheen = surface::SheenAlbedo::table().words();
   common_.insert(common_.end(), sheen.begin(), sheen.end());
 }
@@ -154,16 +155,20 @@ ModelInstances ModelInstances::make(const gl::FunctionsPtr& gl, const gl::Limits
   instances.tables_.ggx_albedo = data->ggx_albedo();
   instances.tables_.ggx_albedo_averages = data->ggx_albedo_averages();
   instances.tables_.sheen_albedo = data->sheen_albedo();
-  instances.tables_.extended_bsdf =
-      std::ranges::any_of(models, [](const scene::Model& model) { return model.source->extended_bsdf; }) ? 1U : 0U;
+  for (const scene::Model& model : models) {
+    const auto variant = static_cast<std::uint32_t>(model.source->bsdf);
+    instances.tables_.extended_bsdf = std::max(instances.tables_.extended_bsdf, variant);
+    instances.clear_surfaces_ = instances.clear_surfaces_ || model.source->clear_surfaces;
+  }
   instances.bytes_ = record_bytes + node_bytes;
   Numbering numbering;
   for (const scene::ModelPart& part : table.parts)
     numbering.emplace_back(models[part.model].source->scene,
                            models[part.model].source->meshes[part.mesh].first_triangle);
   // Paths inside transmissive objects store the object's material as a word offset in the data.
-  const bool lasts = last != nullptr && *last->numbering_ == numbering &&
-                     (last->data_ == data || (instances.tables_.extended_bsdf | last->tables_.extended_bsdf) == 0U);
+  const bool lasts =
+      last != nullptr && *last->numbering_ == numbering &&
+      (last->data_ == data || std::max(instances.tables_.extended_bsdf, last->tables_.extended_bsdf) == 0U);
   instances.numbering_ = lasts ? last->numbering_ : std::make_shared<const Numbering>(std::move(numbering));
   instances.models_ = std::move(models);
   instances.data_ = std::move(data);

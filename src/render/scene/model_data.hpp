@@ -70,6 +70,8 @@ class ModelInstances {
                              ModelDataPtr data, const ModelInstances* last);
   void bind(const gl::Functions& gl) const;
   [[nodiscard]] const core::CmSurfaceTables& tables() const { return tables_; }
+  /// Returns true if some triangles may let rays pass straight on: surface::may_be_clear().
+  [[nodiscard]] bool clear_surfaces() const { return clear_surfaces_; }
   [[nodiscard]] const light::SceneLights& lights() const { return table_.lights; }
   [[nodiscard]] const scene::ModelTable& table() const { return table_; }
   [[nodiscard]] const std::vector<scene::Model>& models() const { return models_; }
@@ -86,6 +88,7 @@ class ModelInstances {
   using Numbering = std::vector<std::pair<surface::ScenePtr, std::uint32_t>>;
   std::shared_ptr<const Numbering> numbering_;
   core::CmSurfaceTables tables_{};
+  bool clear_surfaces_ = false;
   gl::Object records_;
   gl::Object nodes_;
   std::uint64_t bytes_ = 0;

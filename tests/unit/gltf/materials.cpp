@@ -48,7 +48,7 @@ TEST(GltfMaterialLayers, MissingPropertiesHaveTheExtensionsDefaults) {
   EXPECT_TRUE(lines.warnings.empty());
   Material expected;
   EXPECT_EQ(scene->materials[0], expected);
-  EXPECT_FALSE(has_extended_bsdf(scene->materials[0]));
+  EXPECT_EQ(bsdf_variant(scene->materials[0]), BsdfVariant::basic);
   // An infinite or zero attenuation distance means no absorption.
   for (const char* distance : {"null", "0"}) {
     json volume = {{"thicknessFactor", 1}, {"attenuationColor", {0, 0.5, 1}}};
@@ -79,16 +79,38 @@ TEST(GltfMaterialLayers, UnusedMaterialsDoNotSelectTheExtendedShaders) {
     GltfModel model = layered_model(extensions);
     if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
     const ScenePtr scene = imported(model);
-    return scene::make_model_source(scene, scene->pose(0.0), &progress)->extended_bsdf;
+    return scene::make_model_source(scene, scene->pose(0.0), &progress)->bsdf;
   };
   const json sheen = {{"KHR_materials_sheen", {{"sheenColorFactor", {0, 0.1, 0}}}}};
-  EXPECT_TRUE(rich(sheen, true));
-  EXPECT_FALSE(rich(sheen, false));
-  EXPECT_TRUE(rich({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.1}}}}, true));
-  EXPECT_TRUE(rich({{"KHR_materials_iridescence", {{"iridescenceFactor", 0.1}}}}, true));
-  EXPECT_TRUE(rich({{"KHR_materials_transmission", {{"transmissionFactor", 0.1}}}}, true));
-  EXPECT_FALSE(rich({{"KHR_materials_volume", {{"thicknessFactor", 1}}}}, true));
-  EXPECT_FALSE(rich({{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}, true));
+  EXPECT_EQ(rich(sheen, true), BsdfVariant::extended);
+  EXPECT_EQ(rich(sheen, false), BsdfVariant::basic);
+  EXPECT_EQ(rich({{"KHR_materials_anisotropy", {{"anisotropyStrength", 0.1}}}}, true), BsdfVariant::extended);
+  const json iridescence = {{"iridescenceFactor", 0.1}};
+  EXPECT_EQ(rich({{"KHR_materials_iridescence", iridescence}}, true), BsdfVariant::iridescent);
+  EXPECT_EQ(rich({{"KHR_materials_iridescence", iridescence}}, false), BsdfVariant::basic);
+  EXPECT_EQ(
+      rich({{"KHR_materials_iridescence", iridescence}, {"KHR_materials_sheen", sheen["KHR_materials_sheen"]}}, true),
+      BsdfVariant::iridescent);
+  EXPECT_EQ(rich({{"KHR_materials_transmission", {{"transmissionFactor", 0.1}}}}, true), BsdfVariant::extended);
+  EXPECT_EQ(rich({{"KHR_materials_volume", {{"thicknessFactor", 1}}}}, true), BsdfVariant::basic);
+  EXPECT_EQ(rich({{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}, true), BsdfVariant::basic);
+}
+
+TEST(GltfMaterialLayers, OnlyShownThinWallsThatTransmitAreClear) {
+  Progress progress;
+  const auto clear = [&](const json& extensions, bool shown) {
+    GltfModel model = layered_model(extensions);
+    if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
+    const ScenePtr scene = imported(model);
+    return scene::make_model_source(scene, scene->pose(0.0), &progress)->clear_surfaces;
+  };
+  const json through = {{"transmissionFactor", 0.5}};
+  EXPECT_TRUE(clear({{"KHR_materials_transmission", through}}, true));
+  EXPECT_FALSE(clear({{"KHR_materials_transmission", through}}, false));
+  EXPECT_FALSE(clear({{"KHR_materials_transmission", {{"transmissionFactor", 0}}}}, true));
+  EXPECT_FALSE(
+      clear({{"KHR_materials_transmission", through}, {"KHR_materials_volume", {{"thicknessFactor", 1}}}}, true));
+  EXPECT_FALSE(clear({{"KHR_materials_iridescence", {{"iridescenceFactor", 1}}}}, true));
 }
 
 TEST(GltfMaterialLayers, AnisotropyHasTangentsWithoutANormalMap) {
