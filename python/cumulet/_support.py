@@ -481,8 +481,7 @@ def new_array(kind: Any, *shape: int) -> Tuple[Any, memoryview]:
     count = functools.reduce(operator.mul, shape)
     memory = (kind * max(count, 1))()
     view = memoryview(memory).cast("B")[:ctypes.sizeof(kind) * count]
-    letter = "f" if kind is ctypes.c_float else "B"
-    return memory, view.cast(letter, shape=shape) if count else view
+    return memory, view.cast("f" if kind is ctypes.c_float else "B", shape=shape) if count else view
 
 
 # --- results ---------------------------------------------------------------------------------------------------------
