@@ -89,7 +89,15 @@ foreach(target IN LISTS CUMULET_LIBRARIES)
 endforeach()
 list(REMOVE_DUPLICATES inside)
 
-# Shared libraries come first. Debian's libdraco.a contains an older tinygltf, which must not replace libtinygltf.
+# Shared libraries come first. Debian's libdraco.a contains an older tinygltf, which must not replace libtinygltf. The
+# linker would take it together with functions of stb, which libtinygltf.so needs and that archive contains too. As no
+# code of Cumulet calls these, a linker that drops unneeded libraries would drop libstb.
+if("TinyGLTF::TinyGLTF" IN_LIST shared)
+  find_library(CUMULET_SHARED_stb stb)
+  if(CUMULET_SHARED_stb)
+    list(APPEND shared -Wl,--no-as-needed ${CUMULET_SHARED_stb} -Wl,--as-needed)
+  endif()
+endif()
 set(CUMULET_LINKED ${shared})
 if(inside)
   list(JOIN inside "," group)

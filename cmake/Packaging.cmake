@@ -60,6 +60,8 @@ set(python_dir lib/python3/dist-packages/cumulet)
 get_property(python_modules GLOBAL PROPERTY CUMULET_PYTHON_MODULES)
 if(TARGET cumulet_python)
   install(FILES ${python_modules} DESTINATION ${python_dir} COMPONENT python)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/examples/ DESTINATION ${doc_dir}/examples/python COMPONENT python
+          PATTERN __pycache__ EXCLUDE)
   file(RELATIVE_PATH python_to_lib ${CMAKE_INSTALL_PREFIX}/${python_dir} ${CMAKE_INSTALL_FULL_LIBDIR})
   install(CODE "file(CREATE_LINK ${python_to_lib} \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${python_dir}/lib\" SYMBOLIC)"
           COMPONENT python)

@@ -3,7 +3,7 @@
 --enums    a module with the enums
 --api      a module with the structs, callbacks, functions and constants of the header, by ctypes, under their C names
 --stubs    the same as type hints (.pyi)
---methods  a module with classes of methods: one per handle, with keyword arguments for the fields of descriptors
+--methods  a module with a class of methods per handle, with keyword arguments for the fields of descriptors
 
 A function becomes a method if its parameters are numbers, texts, handles and descriptors, and its results numbers,
 handles and structs. python/cumulet has the others by hand. tests/python/coverage_test.py finds functions without either.
@@ -42,6 +42,9 @@ CREATE = {"cumulet_camera_create": "__init__", "cumulet_dynamic_volume_create": 
           "cumulet_volume_from_sparse": "from_sparse", "cumulet_volume_from_fields": "from_states",
           "cumulet_surfaces_from_memory": "from_bytes", "cumulet_surfaces_from_triangles": "from_triangles",
           "cumulet_environment_from_pixels": "from_values"}
+# Handles whose methods all follow from the header. python/cumulet derives its classes from those of the others.
+WHOLE = {"cumulet_camera", "cumulet_inspection", "cumulet_instance", "cumulet_model", "cumulet_sequence",
+         "cumulet_shader_cache"}
 # Methods whose names do not follow from those of the functions.
 RENAMED = {"cumulet_dynamic_volume_set": "set_state"}
 # Functions that other methods call, or that end handles.
@@ -198,7 +201,7 @@ class Generator:
         if name in COUNTS and "*" in c_type:
             return "Any" if kind in SCALARS and kind != "char" else f"Iterable[{'PathLike' if kind == 'char' else 'Mapping[str, Any]'}]"
         if length:
-            return "Matrix" if length == "16" else f"Sequence[{'float' if kind in ('double', 'float') else 'int'}]"
+            return "Matrix" if length == "16" else f"SequenceOf[{'float' if kind in ('double', 'float') else 'int'}]"
         if kind in self.enums:
             return f"api.{camel(kind)} | str"
         if kind == "char":
@@ -294,15 +297,15 @@ class Generator:
             if p.name == "bytes":
                 found[p.name] = "bytes: Any", '*_support.bytes_of(bytes, "bytes")'
             elif kind == "double" and counted:
-                found[p.name] = f"{p.name}: Iterable[Matrix]", f'_support.matrices({p.name}, "{p.name}")'
+                found[p.name] = f"{p.name}: Iterable[Matrix]", f'_support.groups(ctypes.c_double, 16, {p.name}, "{p.name}")'
             elif kind == "double":
                 hint, convert = ("Matrix", "matrix") if p.name == "to_world" else ("float", "seconds")
                 found[p.name] = f"{p.name}: {hint} | None = None", f'_support.{convert}({p.name}, "{p.name}")'
             elif kind == "float" and p.name == "points":
-                found[p.name] = f"{p.name}: Iterable[Tuple[float, float]]", f'_support.groups(2, {p.name}, "{p.name}")'
+                found[p.name] = f"{p.name}: Iterable[Tuple[float, float]]", f'_support.groups(ctypes.c_float, 2, {p.name}, "{p.name}")'
             elif kind == "float" and p.name == "stops":
                 hint = "Iterable[Tuple[float, float, float, float]]"
-                found[p.name] = f"{p.name}: {hint}", f'_support.groups(4, {p.name}, "{p.name}")'
+                found[p.name] = f"{p.name}: {hint}", f'_support.groups(ctypes.c_float, 4, {p.name}, "{p.name}")'
             elif counted and self.is_descriptor(kind):
                 found[p.name] = (f"{p.name}: Iterable[Mapping[str, Any]]",
                                  f'_support.structs(api.{kind}, {p.name}, "{p.name}")')
@@ -425,7 +428,8 @@ class Generator:
             classes[owner] += [*self.method(own, name, plan), ""]
         parts = ['"""Methods that follow from the C API. Made by cmake/python_api.py."""', "",
                  "from __future__ import annotations", "", "import ctypes",
-                 "from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, NamedTuple, Sequence, Tuple", "",
+                 "from typing import TYPE_CHECKING, Any, Callable, Iterable, Mapping, NamedTuple, Tuple",
+                 "from typing import Sequence as SequenceOf", "",
                  f"from . import _support, {api} as api" if api != "api" else "from . import _support, api",
                  "from ._support import Matrix, PathLike", "", "if TYPE_CHECKING:", "    from . import objects"]
         for name in filled:
@@ -436,7 +440,8 @@ class Generator:
             lines = [f"    _end = api.{end}", "", *lines] if end else lines
             if any("self._read(" in line for line in lines):
                 lines = ["    _read: Callable[..., memoryview]", "", *lines]
-            parts += ["", "", f"class {camel(owner)}Methods(_support.Handle):", doc, "", *lines]
+            name = camel(owner) if owner in WHOLE else f"{camel(owner)}Methods"
+            parts += ["", "", f"class {name}(_support.Handle):", doc, "", *lines]
         return parts
 
 

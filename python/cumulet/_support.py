@@ -357,10 +357,8 @@ def fill_from(struct: Any, values: Any, name: str) -> Any:
 
 def structs(struct: Any, values: Iterable[Any], name: str) -> Any:
     filled = [fill_from(struct, value, name) for value in values]
-    result = (struct * len(filled))()
-    for i, one in enumerate(filled):
-        ctypes.memmove(ctypes.addressof(result) + i * ctypes.sizeof(struct), ctypes.byref(one), ctypes.sizeof(struct))
-    result.kept = filled
+    result = (struct * len(filled))(*filled)
+    result.kept = filled  # with the memory that they refer to
     return result
 
 
@@ -369,17 +367,13 @@ def texts(values: Iterable[Any]) -> Any:
     return (ctypes.c_char_p * len(encoded))(*encoded)
 
 
-def matrices(values: Iterable[Any], name: str) -> Any:
-    flat = [numbers(ctypes.c_double, 16, value, name) for value in values]
-    return (ctypes.c_double * (16 * len(flat)))(*itertools.chain.from_iterable(flat))
-
-
-def groups(size: int, values: Iterable[Any], name: str) -> Any:
+def groups(kind: Any, size: int, values: Iterable[Any], name: str) -> Any:
+    """A C array of groups of so many numbers, for example of matrices."""
     try:
-        flat = [numbers(ctypes.c_float, size, value, name) for value in values]
+        flat = [numbers(kind, size, value, name) for value in values]
     except TypeError:
         raise TypeError(f"{name}: groups of {size} numbers are needed, not {values!r}") from None
-    return (ctypes.c_float * (size * len(flat)))(*itertools.chain.from_iterable(flat))
+    return (kind * (size * len(flat)))(*itertools.chain.from_iterable(flat))
 
 
 def matrix(value: Any, name: str) -> Any:
@@ -487,8 +481,7 @@ def new_array(kind: Any, *shape: int) -> Tuple[Any, memoryview]:
     count = functools.reduce(operator.mul, shape)
     memory = (kind * max(count, 1))()
     view = memoryview(memory).cast("B")[:ctypes.sizeof(kind) * count]
-    letter = "f" if kind is ctypes.c_float else "B"
-    return memory, view.cast(letter, shape=shape) if count else view
+    return memory, view.cast("f" if kind is ctypes.c_float else "B", shape=shape) if count else view
 
 
 # --- results ---------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import itertools
 from typing import Any, Dict, List, Mapping, Sequence as SequenceOf, Tuple
 
 from . import _methods, _support, api
+from ._methods import Camera, Inspection, Instance, Model, Sequence, ShaderCache  # noqa: F401
 from ._support import Array, Matrix, PathLike
 
 CHANNELS = {name.lower(): channel for name, channel in api.Channel.__members__.items()}
@@ -121,10 +122,6 @@ class DynamicVolume(_methods.DynamicVolumeMethods):
             raise
 
 
-class Sequence(_methods.SequenceMethods):
-    pass
-
-
 class Surfaces(_methods.SurfacesMethods):
     """Immutable meshes. Created by from_file, from_bytes or from_triangles."""
 
@@ -151,26 +148,6 @@ class Environment(_methods.EnvironmentMethods):
         memory, view = _support.new_array(ctypes.c_float, height, width, 3)
         self._call(api.cumulet_environment_get_pixels, width, height, memory, len(memory))
         return view
-
-
-class Camera(_methods.CameraMethods):
-    pass
-
-
-class ShaderCache(_methods.ShaderCacheMethods):
-    pass
-
-
-class Inspection(_methods.InspectionMethods):
-    pass
-
-
-class Instance(_methods.InstanceMethods):
-    pass
-
-
-class Model(_methods.ModelMethods):
-    pass
 
 
 def list_grids(path: PathLike) -> List[Tuple[str, str, str]]:

@@ -8,6 +8,7 @@ import math
 import os
 import struct
 import sys
+import warnings
 import zlib
 from typing import Any, Callable, Iterator
 
@@ -18,7 +19,9 @@ from ._support import PathLike
 def progress_bar(wanted: bool) -> Iterator[Callable[[float], None]]:
     """A function that shows the finished part, with tqdm if it is there: in a terminal or a notebook."""
     try:
-        from tqdm.auto import tqdm
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # in a notebook without ipywidgets, where a bar of text does
+            from tqdm.auto import tqdm
     except ImportError:
         wanted = False
     if not wanted:
@@ -99,8 +102,7 @@ class Picture:
         with open(path, "wb") as file:
             file.write(data)
 
-    def _repr_png_(self) -> bytes:
-        return self.png()
+    _repr_png_ = png  # for notebooks
 
     def __repr__(self) -> str:
         return f"<cumulet.Picture {self.width}x{self.height}, {self.driver}>"

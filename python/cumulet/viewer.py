@@ -368,8 +368,8 @@ def render(source: Any, size: Tuple[int, int] = (1280, 720), samples: int = 64, 
     """Renders a picture, in a context without a window. Nothing but a source is needed: the camera fits the scene, and
     light and ground are those of a clear day.
 
-    source: A .vdb, .nvdb, .gltf or .glb file, a float32 array indexed [x, y, z], or a Volume, Surfaces, Sequence or
-        DynamicVolume.
+    source: A volume file such as .vdb or .nvdb, a .gltf or .glb file, a float32 array indexed [x, y, z], or a Volume,
+        Surfaces, Sequence or DynamicVolume.
     size: Width and height in pixels.
     samples: Samples per pixel.
     camera: A Camera, or a dictionary of its fields.

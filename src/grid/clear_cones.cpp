@@ -23,7 +23,12 @@ constexpr auto side = static_cast<int>(CM_CLEAR_SIDE);
 // Rows of cubes, one bit per cube.
 using Rows = std::vector<uvec2>;
 void set(std::uint32_t& word, std::uint32_t bits) {
-  if (bits != 0) std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
+  if (bits == 0) return;
+#ifdef __cpp_lib_atomic_ref
+  std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
+#else  // libc++ before version 19
+  __atomic_fetch_or(&word, bits, __ATOMIC_RELAXED);
+#endif
 }
 
 bool is_empty(const TetGrid& grid, std::size_t cell) {

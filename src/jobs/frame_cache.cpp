@@ -189,10 +189,18 @@ Worker::Status FrameCache::status() const {
 
 bool FrameCache::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
   std::unique_lock lock(mutex_);
-  const auto ready = [this] { return !waits(); };
+  const auto ready = [this] { return !awaited_ || !waits(); };
   if (until) return changed_.wait_until(lock, *until, ready);
   changed_.wait(lock, ready);
   return true;
+}
+
+void FrameCache::set_awaited(bool awaited) {
+  {
+    const std::scoped_lock lock(mutex_);
+    awaited_ = awaited;
+  }
+  changed_.notify_all();
 }
 
 void FrameCache::notify() {

@@ -119,6 +119,7 @@ class FrameCache : public JobSource {
   /// Waits until the first requested step is ready or cannot be made, or until the given time. Returns true unless the
   /// time ran out.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override;
+  void set_awaited(bool awaited) override;
 
  private:
   struct Entry {
@@ -204,6 +205,7 @@ class FrameCache : public JobSource {
   std::optional<double> temperature_scale_;
   std::set<std::string> said_;  // logged messages, without file names
   bool cancelled_ = false;      // until the next request
+  bool awaited_ = true;         // see set_awaited()
   std::atomic<std::uint64_t> revision_ = 0;
   std::atomic<bool> final_taken_ = false;  // since the last request
   Worker worker_;                          // last: its thread uses all of the above

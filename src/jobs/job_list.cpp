@@ -12,8 +12,19 @@ void JobList::for_each(Visit&& visit) const {
 }
 
 void JobList::set_players(std::vector<std::shared_ptr<JobSource>> players) {
-  const std::scoped_lock lock(mutex_);
-  players_.swap(players);  // the previous ones are destroyed after the lock is released
+  {
+    const std::scoped_lock lock(mutex_);
+    if (players == players_) return;
+    players_.swap(players);
+    // wait() may hold a player that is dropped. One that stays must be awaited all the time.
+    const auto set_awaited = [](const auto& changed, const auto& others, bool awaited) {
+      for (const auto& player : changed)
+        if (std::ranges::find(others, player) == others.end()) player->set_awaited(awaited);
+    };
+    set_awaited(players, players_, false);
+    set_awaited(players_, players, true);
+  }
+  // The previous ones are destroyed without the lock.
 }
 
 JobContext JobList::context(JobLog::Player player) const {
@@ -43,25 +54,8 @@ bool JobList::wait(Until until) const {
   lock.unlock();
   return std::ranges::all_of(players, [&](const auto& player) {
     const std::shared_ptr<JobSource> held = player.lock();
-    return !held || wait_while_listed(*held, until);
+    return !held || held->wait(until);  // set_players() ends the wait for a player that it drops
   });
-}
-
-// Waits in short steps: a player that is dropped meanwhile ends only when its last holder lets it go.
-bool JobList::wait_while_listed(const JobSource& player, Until until) const {
-  using Clock = std::chrono::steady_clock;
-  constexpr auto step = std::chrono::milliseconds(20);
-  const auto is_listed = [&] {
-    const std::scoped_lock lock(mutex_);
-    return std::ranges::any_of(players_, [&](const auto& listed) { return listed.get() == &player; });
-  };
-  while (is_listed()) {
-    const Clock::time_point next = Clock::now() + step;
-    const bool is_last = until && *until <= next;
-    if (player.wait(is_last ? *until : next)) return true;
-    if (is_last) return false;
-  }
-  return true;
 }
 
 bool JobList::busy() const {

@@ -64,8 +64,6 @@ class JobList {
   // Calls `visit` with kind and source of all, with the lock.
   template <class Visit>
   void for_each(Visit&& visit) const;
-  // Waits for a player until it is replaced.
-  bool wait_while_listed(const JobSource& player, Until until) const;
 
   JobContext context_;
   std::vector<Own> own_;

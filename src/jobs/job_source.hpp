@@ -40,6 +40,9 @@ class JobSource {
   [[nodiscard]] virtual Worker::Status status() const = 0;
   /// Waits until no required result is being made, or until the given time. Returns true unless the time ran out.
   virtual bool wait(std::optional<std::chrono::steady_clock::time_point> until) const = 0;
+  /// False: wait() returns true at once, in threads that wait already too, until this is set to true again. Default:
+  /// does nothing, because only players are dropped. Thread-safe.
+  virtual void set_awaited(bool /*awaited*/) {}
 
   /// Sets the receiver of requests, or null; for tests.
   void set_job_log(JobLog* log) { job_log_ = log; }

@@ -45,6 +45,7 @@ class LiveBuilder : public JobSource {
   [[nodiscard]] bool busy() const override;
   [[nodiscard]] Worker::Status status() const override { return worker_.status(); }
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const override { return worker_.wait(until); }
+  void set_awaited(bool awaited) override { worker_.set_awaited(awaited); }
 
  private:
   // State and settings of the last build, successful or not.

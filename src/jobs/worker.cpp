@@ -130,10 +130,18 @@ Worker::Status Worker::status() const {
 
 bool Worker::wait(std::optional<std::chrono::steady_clock::time_point> until) const {
   std::unique_lock lock(mutex_);
-  const auto idle = [this] { return !next_ && !current_; };
+  const auto idle = [this] { return !awaited_ || (!next_ && !current_); };
   if (until) return changed_.wait_until(lock, *until, idle);
   changed_.wait(lock, idle);
   return true;
+}
+
+void Worker::set_awaited(bool awaited) {
+  {
+    const std::scoped_lock lock(mutex_);
+    awaited_ = awaited;
+  }
+  changed_.notify_all();
 }
 
 void Worker::run_one(std::unique_lock<std::mutex>& lock) {

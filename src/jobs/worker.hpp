@@ -76,6 +76,8 @@ class Worker {
   [[nodiscard]] Status status() const;
   /// Waits until idle, or until the given time. Returns true if idle.
   bool wait(std::optional<std::chrono::steady_clock::time_point> until) const;
+  /// As JobSource::set_awaited().
+  void set_awaited(bool awaited);
 
  private:
   // The running job and why it ends.
@@ -106,6 +108,7 @@ class Worker {
   bool last_was_replaced_ = false;
   std::optional<Error> failure_;
   bool stopping_ = false;
+  bool awaited_ = true;
   std::shared_ptr<WorkerPool> pool_;
   bool active_ = false;     // run() is running, or will
   std::thread::id runner_;  // while it is running

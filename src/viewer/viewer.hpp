@@ -269,8 +269,9 @@ class Viewer final : private StageHost {
   // Does so, with the lock.
   [[nodiscard]] Shot shot_now();
   [[nodiscard]] DisplaySettings display_now() const;
-  // Prepares a frame and takes its state.
-  void take_state(const Frame& frame, Shot& shot, Context::UploadLimits& limits);
+  // Prepares a frame and takes its state. is_rendered: the frame will show the volumes' states, so newer ones may
+  // follow.
+  void take_state(const Frame& frame, bool is_rendered, Shot& shot, Context::UploadLimits& limits);
   // Records the displayed frames, and fills in the flags about pending work.
   void finish_frame(Context& g, FrameResult& result);
   // Updates the upload progress for status() and stats().

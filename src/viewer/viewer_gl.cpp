@@ -202,7 +202,7 @@ FrameResult Viewer::render(const Frame& frame) {
     Shot shot;
     Context::UploadLimits limits;
     attempt("cumulet: upload", [&] {
-      take_state(frame, shot, limits);
+      take_state(frame, true, shot, limits);
       if (frame.budget_ms >= 0.0) g.upload(shot, limits, deadline);
     });
     if (!shot.scene) return;  // there is no state to draw
@@ -220,11 +220,11 @@ FrameResult Viewer::render(const Frame& frame) {
   return result;
 }
 
-void Viewer::take_state(const Frame& frame, Shot& shot, Context::UploadLimits& limits) {
+void Viewer::take_state(const Frame& frame, bool is_rendered, Shot& shot, Context::UploadLimits& limits) {
   const StateLock::Held held = hold_state();
   limits = upload_limits_;
   const auto taken = [&] {
-    stage_.volumes.note_rendered();
+    if (is_rendered) stage_.volumes.note_rendered();
     if (frames_) frames_->in_work = true;
     shot = this->shot();
   };
@@ -264,13 +264,7 @@ WarmUp Viewer::warm_up(const Frame& frame, bool all) {
     Shot shot;
     Context::UploadLimits limits;
     bool waits = false;
-    {
-      const StateLock::Held held = hold_state();
-      prepare(frame);
-      if (frames_) frames_->in_work = true;
-      shot = this->shot();
-      limits = upload_limits_;
-    }
+    take_state(frame, false, shot, limits);
     g.upload(shot, limits, deadline);
     follow_upload(g);
     {

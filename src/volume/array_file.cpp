@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <new>
 #include <type_traits>
 #include <utility>
 
+#include "base/number_parsing.hpp"
 #include "volume/memory.hpp"
 
 namespace cumulet::volume::detail {
@@ -282,7 +282,7 @@ void read_text(Pieces& pieces, const ArrayField& field, std::vector<float>& numb
       while (end < text.size() && !is_blank(text[end])) ++end;
       if (end == at || (end == text.size() && !ended)) break;  // the rest of the word is in the next piece
       float number = 0.0F;
-      const auto [last, error] = std::from_chars(text.data() + at, text.data() + end, number);
+      const auto [last, error] = number_from_chars(text.data() + at, text.data() + end, number);
       if (error != std::errc{} || last != text.data() + end)
         fail("cannot read the value '" + one_line(text.substr(at, end - at), 60) + "'");
       numbers.push_back(number);

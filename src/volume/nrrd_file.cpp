@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
+#include "base/number_parsing.hpp"
 #include "volume/array_file.hpp"
 #include "volume/source_file.hpp"
 
@@ -34,7 +34,7 @@ template <class Number>
 Number number_of(std::string_view text, std::string_view key) {
   Number number{};
   if (text.starts_with('+')) text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto [end, error] = number_from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc{} || end != text.data() + text.size())
     fail("cannot read '" + one_line(text, 60) + "' in \"" + std::string(key) + "\"");
   return number;

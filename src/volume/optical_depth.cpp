@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "base/corners.hpp"
+#include "base/number_parsing.hpp"
 #include "base/progress_part.hpp"
 #include "volume/value_unit.hpp"
 
@@ -278,7 +279,7 @@ std::optional<double> CoarseVolume::suggest_density_scale() const {
   const char* end =
       std::to_chars(digits.data(), digits.data() + digits.size(), scale, std::chars_format::scientific, 2).ptr;
   double rounded = scale;
-  std::from_chars(digits.data(), end, rounded);
+  number_from_chars(digits.data(), end, rounded);
   return std::clamp(rounded, std::numeric_limits<double>::min(), max_density_scale);
 }
 

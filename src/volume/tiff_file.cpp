@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -12,6 +11,7 @@
 #include <new>
 #include <utility>
 
+#include "base/number_parsing.hpp"
 #include "volume/array_file.hpp"
 #include "volume/source_file.hpp"
 
@@ -379,7 +379,7 @@ bool is_image_j(const std::string& text) { return text.starts_with("ImageJ="); }
 
 double number_of(const std::string& text) {
   double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const auto [end, error] = number_from_chars(text.data(), text.data() + text.size(), number);
   return error == std::errc{} && std::isfinite(number) ? number : 0.0;
 }
 

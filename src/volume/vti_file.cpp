@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <utility>
 
+#include "base/number_parsing.hpp"
 #include "volume/array_file.hpp"
 
 namespace cumulet::volume::detail {
@@ -40,7 +40,7 @@ class Tag {
     std::array<Number, count> numbers{};
     for (Number& number : numbers) {
       text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      const auto [end, error] = number_from_chars(text.data(), text.data() + text.size(), number);
       if (error != std::errc{}) fail("cannot read " + std::string(attribute) + "=\"" + one_line(whole, 60) + "\"");
       text.remove_prefix(static_cast<std::size_t>(end - text.data()));
     }

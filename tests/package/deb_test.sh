@@ -33,7 +33,7 @@ done
 for file in usr/bin/cumulet-{render,merge,farm,demo,scene} usr/share/man/man1/cumulet-render.1.gz \
   usr/share/thumbnailers/cumulet.thumbnailer usr/share/metainfo/org.cumulet.cumulet.metainfo.xml \
   usr/share/zsh/vendor-completions/_cumulet-render usr/share/doc/{libcumulet0,libcumulet-dev,cumulet,python3-cumulet}/copyright \
-  usr/share/doc/cumulet/{README,CHANGELOG,CONTRIBUTING}.md; do
+  usr/share/doc/cumulet/{README,CHANGELOG,CONTRIBUTING}.md usr/share/doc/cumulet/examples/python/metaballs.py; do
   [ -s "$root/$file" ] || fail "no package has $file"
 done
 apt-get --simulate --no-download --no-install-recommends install "${debs[@]}" >"$work/apt.log" 2>&1 ||

@@ -22,6 +22,8 @@ mapfile -t compiled <"$work/modules"
 copy_closure "$root" "$python" "${compiled[@]}"
 refuse_own_libraries "$root" wheel
 
+"$1/bin/cumulet-scene" --only cumulus --voxels 20000 "$work/scene" >/dev/null
+cp "$work/scene/cumulus.vdb" "$root/tmp"
 "$python" -m zipfile -e "${wheels[0]}" "$root/opt/site"
 cat >"$root/tmp/render.py" <<'CODE'
 import array, sys
@@ -30,6 +32,7 @@ import cumulet
 values = memoryview(array.array("f", [1.0] * 512)).cast("B").cast("f", (8, 8, 8))
 picture = cumulet.render(values, size=(32, 24), samples=2, backend=sys.argv[1])
 picture.save(f"/tmp/{sys.argv[1]}.png")
+cumulet.render("/tmp/cumulus.vdb", size=(32, 24), samples=2, backend=sys.argv[1]).save("/tmp/cloud.png")
 print(cumulet.__version__, picture)
 CODE
 for backend in "${backends[@]}"; do

@@ -3,13 +3,16 @@
 The environment has CUMULET_SOURCE, the root of the checkout.
 """
 
+import ast
 import ctypes
+import io
 import os
 import pathlib
 import re
 import subprocess
 import sys
 import tempfile
+import tokenize
 import unittest
 
 import cumulet
@@ -19,6 +22,7 @@ SOURCE = pathlib.Path(os.environ["CUMULET_SOURCE"])
 HEADERS = {"src/include/cumulet/cumulet.h": api, "demo/headless/cumulet_headless.h": headless_api}
 # Functions that no method calls, because objects of Python count references themselves.
 LOW_LEVEL = re.compile(r"cumulet_\w+_retain|cumulet_volume_open")
+MOST_LINES_BY_HAND = 900
 STATUSES_OF_NULL = {api.Status.ERROR_INVALID_ARGUMENT}
 
 
@@ -27,6 +31,17 @@ def functions_of(header):
     text = re.sub(r"/\*.*?\*/", " ", (SOURCE / header).read_text(encoding="utf-8"), flags=re.S)
     for name, parameters in re.findall(r"^CUMULET_API [^(;]*?\b(\w+)\(([^;]*)\);", text, flags=re.M | re.S):
         yield name, [] if parameters.strip() == "void" else parameters.split(",")
+
+
+def code_lines(text):
+    """The number of lines without blank ones, comments and docstrings."""
+    ignored = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
+    lines = {line for token in tokenize.generate_tokens(io.StringIO(text).readline) if token.type not in ignored
+             for line in range(token.start[0], token.end[0] + 1)}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node) is not None:
+            lines -= set(range(node.body[0].lineno, node.body[0].end_lineno + 1))
+    return len(lines)
 
 
 def zero(kind):
@@ -104,6 +119,16 @@ class Coverage(unittest.TestCase):
 
     def test_version_is_that_of_the_library(self):
         self.assertEqual(cumulet.__version__, ".".join(map(str, api.VERSION)) + f".{api.cumulet_version() % 100}")
+
+    def test_most_of_the_package_follows_from_the_headers(self):
+        sources = sorted((SOURCE / "python/cumulet").glob("*.py"))
+        self.assertLessEqual(sum(code_lines(path.read_text(encoding="utf-8")) for path in sources), MOST_LINES_BY_HAND)
+
+    def test_old_pythons_can_read_the_package(self):
+        for path in pathlib.Path(cumulet.__file__).parent.glob("*.py"):
+            # __init__.py refuses older ones, and must be readable by them.
+            version = (3, 7) if path.name == "__init__.py" else (3, 8)
+            ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=version)
 
     def test_methods_have_signatures_and_documentation(self):
         import inspect

@@ -3,6 +3,7 @@
 The environment has CUMULET_SOURCE, the root of the checkout.
 """
 
+import base64
 import importlib.util
 import os
 import pathlib
@@ -79,6 +80,38 @@ class Examples(unittest.TestCase):
         self.run_example("moderngl_host.py", self.volume(), self.folder / "moderngl.png", 48, 32, 2)
         self.check_png(self.folder / "moderngl.png")
 
+    @needs("numpy", "pyopenvdb")
+    def test_openvdb_grid(self):
+        import numpy
+        import pyopenvdb
+        path, out = self.volume(), self.folder / "grid.png"
+        self.run_example("openvdb_grid.py", path, out, 48, 32, 2)
+        self.check_png(out)
+        # The written grid has the voxels of the file where the example does not change them.
+        old, new = (pyopenvdb.read(str(one), "density") for one in (path, out.with_suffix(".vdb")))
+        first, last = old.evalActiveVoxelBoundingBox()
+        self.assertEqual(new.evalActiveVoxelBoundingBox(), (first, last))
+        values = [numpy.zeros([b - a + 1 for a, b in zip(first, last)], numpy.float32) for _ in range(2)]
+        for grid, array in zip((old, new), values):
+            grid.copyToArray(array, ijk=first)
+        half = len(values[0]) // 2
+        self.assertTrue((values[0][:half] == values[1][:half]).all())
+        self.assertTrue((values[0][half:] * numpy.float32(0.25) == values[1][half:]).all())
+        info = [cumulet.Volume.from_file(one).get_info() for one in (path, out.with_suffix(".vdb"))]
+        self.assertEqual((info[0].bounds_min, info[0].bounds_max), (info[1].bounds_min, info[1].bounds_max))
+
+    def test_blender_smoke(self):
+        blender = shutil.which("blender")
+        if blender is None:
+            self.skipTest("not installed: blender")
+        out = self.folder / "blender.png"
+        command = (blender, "--background", "--factory-startup", "--python-exit-code", "3", "--python",
+                   EXAMPLES / "blender_smoke.py", "--", out, 3, 48, 32, 2)
+        result = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=SECONDS)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertIn("<cumulet.Picture 48x32", result.stdout)
+        self.check_png(out)
+
     @needs("PyQt6")
     def test_qt_host(self):
         if shutil.which("xvfb-run") is None:
@@ -95,6 +128,23 @@ class Examples(unittest.TestCase):
 
 
 class Notebooks(unittest.TestCase):
+    @needs("nbclient", "nbformat", "ipykernel")
+    def test_the_notebook_runs(self):
+        import nbclient
+        import nbformat
+        notebook = nbformat.read(EXAMPLES / "notebook.ipynb", 4)
+        with tempfile.TemporaryDirectory() as folder:
+            resources = {"metadata": {"path": folder}}
+            nbclient.NotebookClient(notebook, timeout=SECONDS, resources=resources).execute()
+            self.assertEqual(os.listdir(folder), ["evening.exr"])
+        outputs = [one for cell in notebook.cells for one in cell.get("outputs", ())]
+        pictures = [one["data"]["image/png"] for one in outputs if "image/png" in one.get("data", ())]
+        self.assertEqual(len(set(pictures)), 2)
+        for picture in pictures:
+            self.assertEqual(base64.b64decode(picture)[:8], b"\x89PNG\r\n\x1a\n")
+        warnings = [one["text"] for one in outputs if "Warning" in one.get("text", "")]
+        self.assertEqual(warnings, [])
+
     @needs("IPython")
     def test_a_notebook_shows_a_picture(self):
         from IPython.core.formatters import DisplayFormatter

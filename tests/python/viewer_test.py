@@ -155,6 +155,10 @@ class Pictures(unittest.TestCase):
         self.assertEqual(frames, [True])
         viewer.close()
 
+    def test_a_frame_costs_little_more_than_in_c(self):
+        import frame_cost
+        self.assertLess(frame_cost.microseconds(pairs=15), 50.0)
+
     def test_updates_were_announced(self):
         self.assertTrue(self.updates)
 

@@ -333,6 +333,31 @@ TEST_F(FrameCacheTest, AfterAFinalResultNothingIsAwaited) {
   EXPECT_FALSE(cache_.is_final_taken());
 }
 
+TEST_F(FrameCacheTest, WaitingEndsIfNobodyNeedsTheResult) {
+  for (int frame = 0; frame < count; ++frame) clip_.corrupt(frame);
+  std::atomic<bool> has_warned = false;
+  std::atomic<bool> may_continue = false;
+  FrameCache cache{JobContext{cumulet::Log([&](cumulet::LogLevel /*level*/, const char* /*text*/) {
+                                has_warned = true;
+                                has_warned.notify_all();
+                                may_continue.wait(false);  // the job does not end before
+                              }),
+                              [] {}}};
+  const auto is_ready = [&] { return cache.wait(std::chrono::steady_clock::now()); };
+  cache.request({files(), from(0), BuildSettings{}, plenty});
+  has_warned.wait(false);
+  EXPECT_FALSE(is_ready());
+  std::thread waiting([&] { EXPECT_TRUE(cache.wait(std::nullopt)); });
+  cache.set_awaited(false);
+  waiting.join();
+  EXPECT_TRUE(is_ready());
+  cache.set_awaited(true);
+  EXPECT_FALSE(is_ready());
+  may_continue = true;
+  may_continue.notify_all();
+  EXPECT_TRUE(cache.wait(std::nullopt));
+}
+
 TEST_F(FrameCacheTest, StopsUntilTheNextRequest) {
   const FrameFilesPtr all = files();
   for (std::uint32_t round = 0; round < 6; ++round) {

@@ -160,12 +160,17 @@ TEST_F(JobListTest, WaitsUntilTheTimeIsUp) {
 TEST_F(JobListTest, AReplacedPlayerIsNotWaitedFor) {
   struct Endless : Fake {
     using Fake::Fake;
-    bool wait(Time until) const override {
+    bool wait(Time /*until*/) const override {
       has_begun = true;
-      std::this_thread::sleep_until(until.value_or(std::chrono::steady_clock::now() + 60s));
-      return !until;
+      awaited.wait(true);
+      return true;
+    }
+    void set_awaited(bool is_awaited) override {
+      awaited = is_awaited;
+      awaited.notify_all();
     }
     mutable std::atomic<bool> has_begun = false;
+    std::atomic<bool> awaited = true;
   };
   auto played = std::make_shared<Endless>(list_.context(1), "a", calls_);
   const std::weak_ptr<Endless> ends = played;
@@ -178,6 +183,23 @@ TEST_F(JobListTest, AReplacedPlayerIsNotWaitedFor) {
   waiting.join();
   EXPECT_TRUE(done);
   EXPECT_TRUE(ends.expired());
+}
+
+// If a player that stays were dropped for a moment, a waiting thread might return too early.
+TEST_F(JobListTest, OnlyPlayersThatComeOrGoAreNotified) {
+  struct Noting : Fake {
+    using Fake::Fake;
+    void set_awaited(bool awaited) override { calls->push_back(name + (awaited ? " comes" : " goes")); }
+  };
+  const auto a = std::make_shared<Noting>(list_.context(1), "a", calls_);
+  const auto b = std::make_shared<Noting>(list_.context(2), "b", calls_);
+  const auto c = std::make_shared<Noting>(list_.context(3), "c", calls_);
+  list_.set_players({a, b});
+  list_.set_players({a, b});
+  list_.set_players({b, c});
+  list_.set_players({c, b});
+  list_.set_players({a});
+  EXPECT_EQ(calls_, (Calls{"a comes", "b comes", "a goes", "c comes", "c goes", "b goes", "a comes"}));
 }
 
 // The order of ContentKind decides, then the order of the list. Players come last.

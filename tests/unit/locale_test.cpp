@@ -2,12 +2,17 @@
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
+#include <tiffio.h>
 
 #include <clocale>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <cube_lut.hpp>
 #include <fstream>
 #include <locale>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -122,6 +127,60 @@ void add_volumes(Texts& texts, const fs::path& folder) {
   texts["a voxel"] = volume::detail::to_string({12345, -6789, 0});
 }
 
+void write_stack(const fs::path& file) {
+  const std::unique_ptr<TIFF, decltype(&TIFFClose)> tiff(TIFFOpen(file.c_str(), "w"), &TIFFClose);
+  ASSERT_NE(tiff, nullptr);
+  for (std::uint8_t value : {std::uint8_t{7}, std::uint8_t{9}}) {
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGEWIDTH, 1);
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGELENGTH, 1);
+    TIFFSetField(tiff.get(), TIFFTAG_BITSPERSAMPLE, 8);
+    TIFFSetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(tiff.get(), TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(tiff.get(), TIFFTAG_XRESOLUTION, 4.0);
+    TIFFSetField(tiff.get(), TIFFTAG_YRESOLUTION, 4.0);
+    TIFFSetField(tiff.get(), TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53\nimages=2\nslices=2\nspacing=1234.5\n");
+    TIFFWriteScanline(tiff.get(), &value, 0, 0);
+    TIFFWriteDirectory(tiff.get());
+  }
+}
+
+void add_arrays(Texts& texts, const fs::path& folder) {
+  std::ofstream(folder / "a.nrrd", std::ios::binary)
+      << "NRRD0004\ntype: float\ndimension: 3\nsizes: 2 1 1\nencoding: ascii\nspacings: 0.5 1.25 1234.5\n\n1.5 2.25\n";
+  std::ofstream(folder / "a.vti", std::ios::binary)
+      << R"(<VTKFile type="ImageData" byte_order="LittleEndian" header_type="UInt32">)"
+      << R"(<ImageData WholeExtent="0 1 0 0 0 0" Origin="0.5 1234.5 0" Spacing="0.25 1 1.5">)"
+      << R"(<Piece Extent="0 1 0 0 0 0"><PointData><DataArray type="UInt8" Name="density" format="appended" offset="0"/>)"
+      << R"(</PointData></Piece></ImageData><AppendedData encoding="raw">_)" << std::string("\2\0\0\0\1\2", 6)
+      << "</AppendedData></VTKFile>";
+  std::ofstream(folder / "a.raw", std::ios::binary) << "\1\2";
+  std::ofstream(folder / "a.raw.json")
+      << R"({"type": "uint8", "size": [2, 1, 1], "spacing": [0.5, 1.25, 1234.5], "origin": [0.125, 0, 0]})";
+  write_stack(folder / "a.tif");
+  for (const char* name : {"a.nrrd", "a.vti", "a.raw", "a.tif"}) {
+    std::string& text = texts[name];
+    test::Messages messages;
+    const volume::VolumeFrame frame = volume::import_frame(folder / name, {}, messages.log);
+    text = std::to_string(std::lround(100.0F * frame.density.max_value));
+    const glm::dmat4& matrix = frame.density.index_to_world;
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j < 3; ++j) text += ' ' + std::to_string(std::lround(1000.0 * matrix[i][j]));
+    }
+    for (const auto& lines : {messages.warnings, messages.hints}) {
+      for (const std::string& line : lines) text += '\n' + line;
+    }
+    for (const volume::GridInfo& grid : volume::Inspection(folder / name).grids()) {
+      for (const volume::Metadata& entry : grid.metadata) text += '\n' + entry.name + '=' + entry.value;
+    }
+  }
+  std::string points;
+  for (int i = 0; i < 8; ++i) points += "0.5 0.25 1e-1\n";
+  std::istringstream cube("LUT_3D_SIZE 2\nDOMAIN_MIN 0.25 0.25 0.25\n" + points);
+  const demo::DisplayLut lut = demo::read_cube_lut(cube, "a.cube");
+  texts["a.cube"] = std::to_string(std::lround(1000.0F * lut.domain_min));
+  for (const float value : lut.values) texts["a.cube"] += ' ' + std::to_string(std::lround(1000.0F * value));
+}
+
 void add_surfaces(Texts& texts) {
   test::GltfModel model = test::triangle_model({{"translation", {1234.5, 0.25, -2.0}}}, {{"material", 0}});
   model.root["materials"] = test::json::array({{{"emissiveFactor", {0.0, 3.5, 1234.5}}}});
@@ -182,6 +241,7 @@ void add_scenes(Texts& texts, const fs::path& folder, const demo::RenderOptions&
 Texts all_texts(const fs::path& folder, const demo::RenderOptions& options) {
   Texts texts;
   add_volumes(texts, folder);
+  add_arrays(texts, folder);
   add_surfaces(texts);
   add_pictures(texts, folder);
   add_scenes(texts, folder, options);
@@ -220,6 +280,11 @@ TEST_F(Locales, CppLocaleDoesNotAffectFiles) {
   const Texts texts = all_texts(folder_.path(), parsed(folder_.path()));
   expect_same(texts, classic_);
 
+  EXPECT_EQ(texts.at("a.nrrd").rfind("225 500 0 0 0 1250 0 0 0 1234500 ", 0), 0U) << texts.at("a.nrrd");
+  EXPECT_EQ(texts.at("a.vti").rfind("200 250 0 0 0 1000 0 0 0 1500 500 1234500 0", 0), 0U) << texts.at("a.vti");
+  EXPECT_EQ(texts.at("a.raw").rfind("200 500 0 0 0 1250 0 0 0 1234500 125 0 0", 0), 0U) << texts.at("a.raw");
+  EXPECT_NE(texts.at("a.tif").find("1234500"), std::string::npos) << texts.at("a.tif");
+  EXPECT_EQ(texts.at("a.cube").rfind("250 500 250 100 ", 0), 0U) << texts.at("a.cube");
   EXPECT_EQ(texts.at("metadata voxels"), "363344");
   EXPECT_EQ(texts.at("metadata count"), "-1234567");
   EXPECT_EQ(texts.at("metadata scale"), "1234.5");

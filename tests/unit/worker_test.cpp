@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <mutex>
 #include <new>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "jobs/worker.hpp"
@@ -124,6 +126,17 @@ TEST_F(WorkerTest, CancelEndsRunningAndPendingJobs) {
   worker_.post(job("third"));
   EXPECT_FALSE(worker_.status().failure);
   EXPECT_EQ(done(), (std::vector<std::string>{"third"}));
+}
+
+TEST_F(WorkerTest, WaitingEndsIfNobodyNeedsTheResult) {
+  begin("first");
+  std::thread waiting([&] { EXPECT_TRUE(worker_.wait(std::nullopt)); });
+  worker_.set_awaited(false);
+  waiting.join();
+  EXPECT_TRUE(worker_.busy());
+  worker_.set_awaited(true);
+  EXPECT_FALSE(worker_.wait(std::chrono::steady_clock::now()));
+  EXPECT_EQ(done(), (std::vector<std::string>{"first"}));
 }
 
 TEST_F(WorkerTest, ReportsStageFailureAndEnd) {
