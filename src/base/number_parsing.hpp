@@ -12,6 +12,10 @@
 #include <type_traits>
 #include <version>
 
+#ifdef __APPLE__
+#include <xlocale.h>
+#endif
+
 // Numbers from text, in any locale of the process.
 
 namespace cumulet {
