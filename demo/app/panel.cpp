@@ -45,7 +45,7 @@ std::string clock_text(double hour) {
 /// Returns the first name of the form "Camera 1" that no camera has.
 std::string free_camera_name(const std::vector<NamedCamera>& cameras) {
   for (std::size_t number = 1;; ++number) {
-    std::string name = "Camera " + std::to_string(number);
+    std::string name = std::string("Camera ").append(std::to_string(number));
     if (std::ranges::find(cameras, name, &NamedCamera::name) == cameras.end()) return name;
   }
 }

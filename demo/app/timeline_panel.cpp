@@ -115,11 +115,11 @@ struct LegendEntry {
 
 /// Explains the colors of the timeline.
 std::vector<LegendEntry> legend_of(const Play& play, bool other) {
-  std::vector<LegendEntry> legend = {{cached_color, "cached " + std::to_string(play.info.ready_frames) + " / " +
-                                                        std::to_string(play.info.frames) + ", " +
-                                                        short_bytes(static_cast<double>(play.info.bytes))}};
+  const std::string cached = std::string("cached ").append(std::to_string(play.info.ready_frames));
+  const std::string all = std::to_string(play.info.frames) + ", " + short_bytes(static_cast<double>(play.info.bytes));
+  std::vector<LegendEntry> legend = {{cached_color, cached + " / " + all}};
   if (play.info.failed_frames > 0)
-    legend.push_back({broken_color, "missing " + std::to_string(play.info.failed_frames)});
+    legend.push_back({broken_color, std::string("missing ").append(std::to_string(play.info.failed_frames))});
   if (other) legend.push_back({displayed_color, "displayed"});
   return legend;
 }
@@ -183,7 +183,7 @@ void Panel::transport(Model& model, bool other, std::vector<Command>& commands) 
   draw_transport(ui_, gap, model, commands);
   // A narrow timeline has the buttons, then the frame, then the frame rate, then the legend.
   const float rate = ui_.px(76.0f);
-  std::string text = "Frame " + std::to_string(play.frame());
+  std::string text = std::string("Frame ").append(std::to_string(play.frame()));
   if (right - ImGui::GetCursorPosX() > rate + ImGui::CalcTextSize(text.c_str()).x + ui_.px(24.0f)) {
     ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ui_.px(6.0f));
     ImGui::SetNextItemWidth(rate);

@@ -59,7 +59,8 @@ std::optional<Stand> stand_of(const ObjectMatrix& numbers) {
   const bool locked = std::abs(sin_y) > 1.0 - 1e-12;  // X and Z turn about one axis
   const double x = locked ? std::atan2(-axes[2].y, axes[1].y) : std::atan2(axes[1].z, axes[2].z);
   const double z = locked ? 0.0 : std::atan2(axes[0].y, axes[0].x);
-  stand.degrees = {x / degree, std::asin(sin_y) / degree, z / degree};
+  // Adding 0 makes -0 positive.
+  stand.degrees = {x / degree + 0.0, std::asin(sin_y) / degree + 0.0, z / degree + 0.0};
   if (!is_same(matrix_of(stand), numbers)) return std::nullopt;
   return stand;
 }

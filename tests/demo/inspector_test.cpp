@@ -177,7 +177,9 @@ TEST_P(InspectorTest, MessagesStayInTheImage) {
   for (const char* text : {"The volume burns: dusk light and the filmic tone map", "Saved /a/picture.png, 1920x1080"})
     show_message(model_, true, text, time_);
   for (int i = 0; i < 3; ++i)
-    show_message(model_, true, "A long message about a file that cannot be read, number " + std::to_string(i), time_);
+    show_message(model_, true,
+                 std::string("A long message about a file that cannot be read, number ").append(std::to_string(i)),
+                 time_);
   frames();
   const ImGuiWindow* const window = ImGui::FindWindowByName("messages");
   ASSERT_NE(window, nullptr);
