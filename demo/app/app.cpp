@@ -51,6 +51,7 @@ App::App(DemoOptions options)
   model_.unchosen_ground = options_.unchosen_ground;
   loading_.suggest = model_.scene.auto_density_scale && model_.scene.medium.density_scale == 0.0;
   spell_out_defaults(model_.scene);
+  if (options_.scene_file.empty()) model_.scene.sequence.playback.repeat = CUMULET_REPEAT_LOOP;
   model_.preferences = load_preferences(preferences_path_);
   model_.navigation.style = model_.preferences.style;
   derived_.exposure_given = options_.exposure_given;
@@ -410,6 +411,7 @@ void App::remember_files(const Answer& answer) {
         remember();  // a program that is killed keeps its recent files
         break;
       case Answer::File::Fate::failed:
+        drop_failed(file.path);
         preferences.forget(file.path);
         preferences.forget(loading_.scene);
         loading_.scene.clear();

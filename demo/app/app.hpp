@@ -60,6 +60,8 @@ class App {
   /// Opens the file dialog in the last used folder. endings: the extensions of files that it lists.
   /// Uses the desktop's file dialogs or the program's own, as the preferences say. A replay uses the own ones.
   void choose_dialogs();
+  /// Shows the version, the OpenGL driver, the libraries and their licenses.
+  void show_about();
   void open_dialog(const char* title, Action action, std::vector<std::string> endings);
   /// Opens the file dialog for a new file with this extension.
   void save_dialog(const char* title, Action action, const char* ending);
@@ -73,8 +75,12 @@ class App {
   void open_dropped(const std::vector<std::string>& files);
   /// Selects an object that the user has added. It is placed in the scene when its size is known.
   void take_added(const Item& item);
+  /// Removes the objects that were added with this file, which cannot be opened. Objects of a scene file stay.
+  void drop_failed(const std::string& file);
   /// Gives added objects that are tiny, huge or far a size and a place that suit the scene.
   void place_added();
+  /// Sets the up axis of a volume. Its clip turns with it.
+  void set_up_axis(SceneVolume& volume, UpAxis up);
   /// Says that a volume stands on its Z axis, with a button for the Y axis. further: the file of a further volume, ""
   /// for the first one.
   void show_up_axis(const std::string& path, const std::string& further);

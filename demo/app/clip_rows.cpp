@@ -29,10 +29,10 @@ void box_rows(Ui& ui, ClipBox& box, const Box& whole) {
     double& high = box[static_cast<std::size_t>(axis) + 3];
     const double apart = least * std::max(whole.most[axis] - whole.least[axis], 1e-30);
     const std::string name = std::string("Clip ") + names[static_cast<std::size_t>(axis)];
-    if (ui.slider((name + " min").c_str(), "Lowest coordinate of the box, in the volume's own space.", low,
+    if (ui.slider((name + " min").c_str(), "The box begins here, in the coordinates of the volume.", low,
                   whole.least[axis], whole.most[axis], "%.4g"))
       low = std::min(low, high - apart);
-    if (ui.slider((name + " max").c_str(), "Highest coordinate of the box, in the volume's own space.", high,
+    if (ui.slider((name + " max").c_str(), "The box ends here, in the coordinates of the volume.", high,
                   whole.least[axis], whole.most[axis], "%.4g"))
       high = std::max(high, low + apart);
   }
@@ -43,8 +43,8 @@ void plane_rows(Ui& ui, settings::Clip& clip, const Box& whole) {
   for (std::size_t i = 0; i < clip.planes.size(); ++i) {
     const std::string name = "Clip plane " + std::to_string(i + 1);
     ClipPlane plane = clip.planes[i];
-    if (ui.numbers(name.c_str(), "a, b, c, d: the part with a x + b y + c z + d >= 0 is shown.", plane,
-                   static_cast<float>(0.002 * std::max(1.0, size))) &&
+    if (ui.numbers(name.c_str(), "The plane's normal and its offset: the part with a x + b y + c z + d >= 0 is shown.",
+                   plane, static_cast<float>(0.002 * std::max(1.0, size))) &&
         settings::clip_plane_refusal(plane).empty())
       clip.planes[i] = plane;
   }
@@ -57,6 +57,25 @@ void plane_rows(Ui& ui, settings::Clip& clip, const Box& whole) {
 }
 
 }  // namespace
+
+settings::Clip turned(const settings::Clip& clip, UpAxis to) {
+  // A volume with Z up has its Z along the scene's Y, and its Y along the scene's -Z.
+  const auto point = [to](double x, double y, double z) { return to == UpAxis::z ? dvec3(x, z, -y) : dvec3(x, -z, y); };
+  settings::Clip result;
+  if (clip.box) {
+    const ClipBox& box = *clip.box;
+    const dvec3 a = point(box[0], box[1], box[2]);
+    const dvec3 b = point(box[3], box[4], box[5]);
+    const dvec3 low = glm::min(a, b);
+    const dvec3 high = glm::max(a, b);
+    result.box = {low.x, low.y, low.z, high.x, high.y, high.z};
+  }
+  for (const ClipPlane& plane : clip.planes) {
+    const dvec3 normal = point(plane[0], plane[1], plane[2]);
+    result.planes.push_back({normal.x, normal.y, normal.z, plane[3]});
+  }
+  return result;
+}
 
 void clip_rows(Ui& ui, settings::Clip& clip, const std::optional<Box>& box) {
   const Box whole = whole_of(box);

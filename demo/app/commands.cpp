@@ -1,3 +1,4 @@
+#include <glad/gl.h>
 #include <imgui.h>
 
 #include <algorithm>
@@ -13,7 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "about.hpp"
 #include "app.hpp"
+#include "clip_rows.hpp"
 #include "desktop.hpp"
 #include "dropped_files.hpp"
 #include "ocio_text.hpp"
@@ -244,17 +247,18 @@ struct App::Commands {
          const auto up = static_cast<UpAxis>(command.value);
          if (!command.text.empty()) {
            for (SceneVolume& other : app.model_.scene.others)
-             if (other.volume == command.text) other.up = up;
+             if (other.volume == command.text) app.set_up_axis(other, up);
            return;
          }
          app.loading_.fit = app.model_.scene.up != up;
-         app.model_.scene.up = up;
+         app.set_up_axis(app.model_.scene, up);
          if (app.model_.status.play) app.model_.scene.sequence.frame = app.model_.status.play->frame();
        }},
       {Action::auto_density, [](App& app, const Command&) { app.request({Request::Type::suggest_density}); }},
       {Action::play_row,
        [](App& app, const Command&) {
          app.clock_.play_row();
+         app.model_.scene.sequence.playback.repeat = CUMULET_REPEAT_LOOP;
          app.loading_.reload = true;
          app.clock_.play_when_loaded(true);
        }},
@@ -295,13 +299,19 @@ struct App::Commands {
                          static_cast<std::size_t>(command.value), 0};
          if (transform_of(app.model_.scene, item)) set_transform(app.model_.scene, item, glm::dmat4(1.0));
        }},
+      {Action::go_to_end,
+       [](App& app, const Command& command) {
+         app.model_.playing = false;
+         app.clock_.go_to_end(command.value > 0);
+       }},
+      {Action::about, [](App& app, const Command&) { app.show_about(); }},
   });
 
   /// Returns true if each action has a function, at its index.
   static constexpr bool is_complete() {
     for (std::size_t i = 0; i < table.size(); ++i)
       if (table[i].action != static_cast<Action>(i)) return false;
-    return table.size() == static_cast<std::size_t>(Action::keep_place) + 1;
+    return table.size() == static_cast<std::size_t>(Action::about) + 1;
   }
 };
 
@@ -364,6 +374,7 @@ void App::open(const std::string& path) {
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();
     model_.scene.sequence.frame.reset();
+    model_.scene.sequence.playback.repeat = CUMULET_REPEAT_LOOP;
     model_.scene.visible = true;
     deselect(model_);
     loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
@@ -388,6 +399,27 @@ void App::follow_samples() {
   } catch (const std::exception& error) {
     show_message(model_, true, error.what(), now_);
   }
+}
+
+void App::set_up_axis(SceneVolume& volume, UpAxis up) {
+  if (volume.up == up) return;
+  volume.up = up;
+  if (volume.clip.empty()) return;
+  // The clip is in the space after this transform.
+  if (volume.to_world == SceneVolume().to_world)
+    volume.clip = turned(volume.clip, up);
+  else
+    show_message(model_, false,
+                 "The clip of " + volume.label() + " stays, because the volume has a transform of its own", now_);
+}
+
+void App::show_about() {
+  const auto text_of = [this](unsigned name) {
+    const auto* const text = gl_->GetString(name);
+    return text == nullptr ? std::string("unknown") : std::string(reinterpret_cast<const char*>(text));
+  };
+  panel_.question().ask("About Cumulet", about_text(text_of(GL_RENDERER), text_of(GL_VERSION)),
+                        {{"Close", "Closes the window (Escape).", std::nullopt}});
 }
 
 void App::show_up_axis(const std::string& path, const std::string& further) {

@@ -27,13 +27,13 @@ void Panel::environment(Model& model, std::vector<Command>& commands) {
                     model.thumbnail_texture, settings.rotation_degrees, ahead);
   }
   if (any) settings::for_each<Desc>([&](const auto& setting) { rows_.draw(setting, settings.*setting.field); });
-  const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
+  const float width = any ? Ui::width_beside("Open environment", "Remove environment") : -1.0f;
   if (ui_.button("Open environment",
                  "Opens an equirectangular Radiance (.hdr) or OpenEXR (.exr) image, or an .exr cube map.",
-                 {any ? width : -1.0f, 0.0f}))
+                 {width, 0.0f}))
     commands.push_back({Action::environment_dialog});
   if (!any) return;
-  ImGui::SameLine();
+  if (width > 0.0f) ImGui::SameLine();
   if (ui_.button("Remove environment", "Removes the environment map; sun and sky light the scene again.",
                  {width, 0.0f}))
     commands.push_back({Action::clear_environment});

@@ -22,7 +22,7 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
       case Item::Kind::model:
         return one_model(model.scene.models[item->index]);
       case Item::Kind::analytic_light:
-        return analytic_light(model.scene.analytic_lights[item->index]);
+        return analytic_light(model, model.scene.analytic_lights[item->index]);
     }
   }
   switch (std::get<Part>(subject)) {
@@ -42,15 +42,9 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
 }
 
 void Panel::render(Model& model, std::vector<Command>& commands) {
-  const auto section = [this](const char* label, bool open, const auto& content) {
-    if (!ui_.section(label, open)) return;
-    ImGui::Spacing();
-    content();
-    ImGui::Dummy({0.0f, ui_.px(6.0f)});
-  };
-  section("Image", true, [&] { display(model, commands); });
-  section("Sampling", true, [&] { sampling(model); });
-  section("Advanced", false, [&] {
+  ui_.group("Image", true, "Image", [&] { display(model, commands); });
+  ui_.group("Sampling", true, "Sampling", [&] { sampling(model); });
+  ui_.group("Advanced", false, "Advanced", [&] {
     advanced_sampling(model);
     Ui::heading("Grid");
     grid(model);
@@ -60,7 +54,11 @@ void Panel::render(Model& model, std::vector<Command>& commands) {
 }
 
 void Panel::volume(Model& model, const Item& item, std::vector<Command>& commands) {
-  if (!ImGui::BeginTabBar("volume")) return;
+  // Tabs that would be shortened to a few letters are reached by arrows and by a list.
+  const bool plays = item.index == 0 && (model.status.play || model.status.neighbours);
+  const float needed = ui_.px(plays ? 264.0f : 190.0f);
+  const ImGuiTabBarFlags narrow = ImGuiTabBarFlags_FittingPolicyScroll | ImGuiTabBarFlags_TabListPopupButton;
+  if (!ImGui::BeginTabBar("volume", ImGui::GetContentRegionAvail().x < needed ? narrow : 0)) return;
   const auto tab = [this](const char* label, const char* tip, const auto& content) {
     const bool open = ImGui::BeginTabItem(label);
     ui_.remember(label, tip);
@@ -85,8 +83,7 @@ void Panel::volume(Model& model, const Item& item, std::vector<Command>& command
     else
       up_axis(shown.up, shown.volume, commands);
   });
-  if (first && (model.status.play || model.status.neighbours))
-    tab("Sequence", "Playback of numbered files.", [&] { sequence(model, commands); });
+  if (plays) tab("Sequence", "Playback of numbered files.", [&] { sequence(model, commands); });
   ImGui::EndTabBar();
 }
 
@@ -100,7 +97,7 @@ void Panel::object(SceneVolume& volume, const Item& item, std::vector<Command>& 
   }
   name_row(volume.name);
   ui_.checkbox("Visible", "If off, the object is hidden and casts no shadow.", volume.visible);
-  stand(volume, item.transform_index);
+  transform_.draw(volume, item.transform_index);
 }
 
 void Panel::name_row(std::string& name) {

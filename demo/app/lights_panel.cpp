@@ -5,14 +5,13 @@
 #include <type_traits>
 
 #include "panel.hpp"
+#include "selection.hpp"
 
 namespace cumulet::demo {
 
 namespace {
 
 using Desc = cumulet_light_desc;
-
-constexpr double sun_at_noon = 4.0;  // W/m²
 
 /// Returns true if lights of this kind have the setting.
 template <class Setting>
@@ -28,7 +27,8 @@ bool has(const Setting& setting, cumulet_light_kind kind) {
 
 }  // namespace
 
-void Panel::analytic_light(Desc& analytic_light) {
+void Panel::analytic_light(Model& model, Desc& analytic_light) {
+  const cumulet_light_kind before = analytic_light.kind;
   settings::for_each<Desc>([&](const auto& setting) {
     if (*setting.row.label == '\0' || !has(setting, analytic_light.kind)) return;  // no label: only in scene files
     auto& value = analytic_light.*setting.field;
@@ -38,14 +38,14 @@ void Panel::analytic_light(Desc& analytic_light) {
     if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, double[3]>) {
       const double length = std::hypot(value[0], value[1], value[2]);
       ui_.numbers(setting.row.label, setting.row.tip, value, static_cast<float>(0.01 * std::max(1.0, length)));
+    } else if constexpr (std::is_same_v<std::remove_reference_t<decltype(value)>, float[3]>) {
+      light_color_.draw(info.row.label, info.row.tip, value);
+    } else {
       // Without a reset, because the defaults of a light, such as no power, make no light.
-    } else if (rows_.draw(info, value) && setting.is(&Desc::kind)) {
-      // Changing the kind sets values that suit it: a distant light's power is in W/m², and a spot needs a cone angle.
-      if (analytic_light.kind == CUMULET_LIGHT_DISTANT) analytic_light.power = static_cast<float>(sun_at_noon);
-      if (analytic_light.kind == CUMULET_LIGHT_SPOT && analytic_light.angle_degrees == 0.0)
-        analytic_light.angle_degrees = 45.0;
+      rows_.draw(info, value);
     }
   });
+  if (analytic_light.kind != before) adapt_light(analytic_light, before, model.scene);
   if (analytic_light.kind == CUMULET_LIGHT_DISTANT)
     analytic_light.angle_degrees = std::min(analytic_light.angle_degrees, 90.0);
 }

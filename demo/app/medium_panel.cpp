@@ -12,21 +12,12 @@
 namespace cumulet::demo {
 namespace {
 
-/// Returns true if the setting has an effect: the phase function has it, and the volume has the grid that it scales.
-/// flame_colors: a color ramp replaces the color of flames.
-template <class Setting>
-bool acts(const Setting& setting, const cumulet_medium_desc& medium, const Fields& fields, bool flame_colors) {
-  using Desc = cumulet_medium_desc;
-  if (setting.is(&Desc::second_anisotropy) || setting.is(&Desc::second_weight))
-    return medium.phase == CUMULET_PHASE_TWO_LOBE;
-  if (setting.is(&Desc::droplet_diameter)) return medium.phase == CUMULET_PHASE_MIE;
-  if (setting.is(&Desc::anisotropy)) return medium.phase != CUMULET_PHASE_MIE;
-  const auto has = [&](cumulet_ramp grid) { return fields[static_cast<std::size_t>(grid)].most > 0.0f; };
-  if (setting.is(&Desc::flame_color) && flame_colors) return false;
-  if (setting.is(&Desc::flame_strength) || setting.is(&Desc::flame_color)) return has(CUMULET_RAMP_FLAME);
-  const bool of_heat = setting.is(&Desc::temperature_scale) || setting.is(&Desc::temperature_offset) ||
-                       setting.is(&Desc::blackbody) || setting.is(&Desc::blackbody_tint);
-  return !of_heat || has(CUMULET_RAMP_TEMPERATURE);
+using Desc = cumulet_medium_desc;
+
+bool has_grid(const Fields& fields, cumulet_ramp grid) { return fields[static_cast<std::size_t>(grid)].most > 0.0f; }
+
+bool has_fire(const Fields& fields) {
+  return has_grid(fields, CUMULET_RAMP_TEMPERATURE) || has_grid(fields, CUMULET_RAMP_FLAME);
 }
 
 /// Returns what is known about a volume other than the first one; null before it is open.
@@ -38,7 +29,6 @@ const OtherVolume* find_other(const Status& status, const VolumeFile& file) {
 }  // namespace
 
 void Panel::medium(Model& model, std::size_t index, std::vector<Command>& commands) {
-  using Desc = cumulet_medium_desc;
   SceneVolume& volume = volume_at(model.scene, index);
   const bool first = index == 0;
   const OtherVolume* const other = first ? nullptr : find_other(model.status, volume);
@@ -52,19 +42,34 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
   for (const settings::Choice& preset : preset_choices) presets.push_back({preset.label, preset.value, preset.tip});
   const std::optional<Preset> now = preset_of(medium);
   int chosen = now ? static_cast<int>(*now) : -1;
-  if (ui_.choose("Preset", "Preset of the medium; does not change the density scale and the ramps.", presets, chosen))
+  if (ui_.choose("Preset", "Preset of the material; does not change the density and the ramps.", presets, chosen))
     apply(static_cast<Preset>(chosen), medium);
   bool suggests = false;
-  settings::for_each<Desc>([&](auto setting) {
-    // The first volume's maximum applies to all.
-    if (!first && setting.is(&Desc::max_bounces)) return;
-    if (!acts(setting, medium, fields, !volume.color_ramps[CUMULET_RAMP_FLAME].empty())) return;
-    if (!first && setting.is(&Desc::density_scale) && volume.auto_density_scale) setting.row.zero = "auto";
-    rows_.draw(setting, medium.*setting.field);
-    if (setting.is(&Desc::density_scale) && (other != nullptr || (first && model.status.has_volume)))
-      suggests = ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f});
-    if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
+  ui_.group("Density", true, "Material/Density", [&] {
+    settings::with(&Desc::density_scale, [&](auto setting) {
+      if (!first && volume.auto_density_scale) setting.row.zero = "auto";
+      rows_.draw(setting, medium.density_scale);
+    });
+    if (other != nullptr || (first && model.status.has_volume))
+      suggests =
+          ui_.button("Auto density", "Sets a density that suits the volume: a mean optical depth of 8.", {-1.0f, 0.0f});
   });
+  ui_.group("Scattering", true, "Material/Scattering", [&] { scattering(medium); });
+  if (has_fire(fields)) ui_.group("Fire", true, "Material/Fire", [&] { fire(medium, volume, fields); });
+  const bool glows = medium.emission[0] > 0.0f || medium.emission[1] > 0.0f || medium.emission[2] > 0.0f;
+  ui_.group("Emission", glows, "Material/Emission", [&] {
+    settings::with(&Desc::emission, [&](const auto& setting) { rows_.draw(setting, medium.emission); });
+  });
+  const bool is_hot = has_grid(fields, CUMULET_RAMP_TEMPERATURE) && medium.blackbody > 0.0f;
+  // The first volume's maximum applies to all.
+  if (first || is_hot)
+    ui_.group("Advanced", false, "Material/Advanced", [&] {
+      const auto row = [&](auto field) {
+        settings::with(field, [&](const auto& setting) { rows_.draw(setting, medium.*field); });
+      };
+      if (first) row(&Desc::max_bounces);
+      if (is_hot) row(&Desc::temperature_offset);
+    });
   if (first) {
     volume.medium = medium;
     if (suggests) commands.push_back({Action::auto_density});
@@ -76,15 +81,53 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
     volume.medium = medium;
     if (medium.density_scale > 0.0) volume.auto_density_scale = false;
   }
-  ramps(model, volume, fields);
+  const auto any = [](const auto& all) {
+    return std::ranges::any_of(all, [](const auto& one) { return !one.empty(); });
+  };
+  const bool has_ramps = any(volume.ramps) || any(volume.color_ramps);
+  const bool can_have = std::ranges::any_of(fields, [](const FieldValues& field) { return field.most > 0.0f; });
+  if (has_ramps || can_have)
+    ui_.group("Curves and color ramps", has_ramps, "Material/Ramps", [&] { ramps(model, volume, fields); });
+}
+
+void Panel::scattering(Desc& medium) {
+  const auto row = [&](auto field) {
+    settings::with(field, [&](const auto& setting) { rows_.draw(setting, medium.*field); });
+  };
+  row(&Desc::coalbedo);
+  absorption(medium.coalbedo);
+  row(&Desc::phase);
+  if (medium.phase == CUMULET_PHASE_MIE) return row(&Desc::droplet_diameter);
+  row(&Desc::anisotropy);
+  if (medium.phase != CUMULET_PHASE_TWO_LOBE) return;
+  row(&Desc::second_anisotropy);
+  row(&Desc::second_weight);
+}
+
+void Panel::fire(Desc& medium, const SceneVolume& volume, const Fields& fields) {
+  const auto row = [&](auto field) {
+    settings::with(field, [&](const auto& setting) { rows_.draw(setting, medium.*field); });
+  };
+  if (has_grid(fields, CUMULET_RAMP_TEMPERATURE)) {
+    row(&Desc::blackbody);
+    // Without brightness nothing else has an effect.
+    if (medium.blackbody > 0.0f) {
+      row(&Desc::blackbody_tint);
+      row(&Desc::temperature_scale);
+    }
+  }
+  if (!has_grid(fields, CUMULET_RAMP_FLAME)) return;
+  row(&Desc::flame_strength);
+  // A color ramp replaces the color.
+  if (volume.color_ramps[CUMULET_RAMP_FLAME].empty()) row(&Desc::flame_color);
 }
 
 /// Draws a slider for the absorption. A cloud's absorption is far below the resolution of a color field.
 void Panel::absorption(float (&coalbedo)[3]) {
   float mean = (coalbedo[0] + coalbedo[1] + coalbedo[2]) / 3.0f;
   const float before = mean;
-  if (!ui_.slider("Absorption", "Mean fraction of light that is absorbed: 1 - albedo.", mean, 0.0f, 1.0f, "%.4g",
-                  ImGuiSliderFlags_Logarithmic))
+  if (!ui_.slider("Absorption", "Fraction of the light that the medium absorbs, on average. The rest is scattered.",
+                  mean, 0.0f, 1.0f, "%.4g", ImGuiSliderFlags_Logarithmic))
     return;
   for (float& one : coalbedo) one = before > 0.0f ? std::min(one * mean / before, 1.0f) : mean;
 }

@@ -22,10 +22,14 @@ void Panel::messages(Model& model, std::vector<Command>& commands) {
   ImGui::SetNextWindowPos({right - ui_.px(12.0f), static_cast<float>(view_.y + view_.height) - ui_.px(44.0f)},
                           ImGuiCond_Always, {1.0f, 1.0f});
   ImGui::SetNextWindowSize({width, 0.0f});
+  // In a low window the messages scroll, so that they do not cover the menus.
+  ImGui::SetNextWindowSizeConstraints(
+      {0.0f, 0.0f}, {width, std::max(static_cast<float>(view_.height) - ui_.px(56.0f), ui_.px(40.0f))});
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ui_.px(10.0f), ui_.px(7.0f)});
   ImGui::Begin("messages", nullptr,
-               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
-                   ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
+               ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
+                   ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoFocusOnAppearing |
+                   ImGuiWindowFlags_NoNav);
   for (std::size_t i = 0; i < model.messages.size(); ++i) {
     ImGui::PushID(static_cast<int>(i));
     toast(model.messages[i], commands);
@@ -38,18 +42,21 @@ void Panel::messages(Model& model, std::vector<Command>& commands) {
 void Panel::toast(const Message& message, std::vector<Command>& commands) {
   const float button = ui_.px(76.0f);
   const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float right = ImGui::GetWindowContentRegionMax().x;
+  // In a narrow window the buttons are below the text.
+  const bool narrow = right < ui_.px(280.0f);
   ImGui::SetCursorPosX(ImGui::GetCursorPosX() + ui_.px(12.0f));
   ImGui::AlignTextToFramePadding();
   // Messages are wrapped, not truncated.
-  ImGui::PushTextWrapPos(ImGui::GetWindowWidth() - button - ui_.px(18.0f));
+  ImGui::PushTextWrapPos(narrow ? right : right - button - ui_.px(8.0f));
   ImGui::TextUnformatted(message.text.c_str());
   ImGui::PopTextWrapPos();
   ImGui::GetWindowDrawList()->AddRectFilled({corner.x, ImGui::GetItemRectMin().y},
                                             {corner.x + ui_.px(4.0f), ImGui::GetItemRectMax().y},
                                             message.error ? error_color : notice_color, ui_.px(2.0f));
   ui_.remember("Message", message.text.c_str());
-  ImGui::SameLine();
-  ImGui::SetCursorPosX(ImGui::GetWindowWidth() - button - ui_.px(10.0f));
+  if (!narrow) ImGui::SameLine();
+  ImGui::SetCursorPosX(narrow ? ImGui::GetCursorPosX() + ui_.px(12.0f) : right - button);
   if (ui_.button("Dismiss", "Hides the message (Escape).", {button, 0.0f}))
     commands.push_back({Action::dismiss, message.text});
   if (!message.button) return;

@@ -101,7 +101,9 @@ enum class Action {
   quit_anyway,   // asks only about unsaved changes
   follow_light,  // measures the exposure again, because the sun has moved
   daylight,      // sets the default daylight and display instead of the dusk of a burning volume
-  keep_place     // text: "volume" or "model", value: its index; removes the transform that the program gave it
+  keep_place,    // text: "volume" or "model", value: its index; removes the transform that the program gave it
+  go_to_end,     // value: -1 for the first played frame, 1 for the last one
+  about          // shows the version, the OpenGL driver and the libraries
 };
 
 struct Command {

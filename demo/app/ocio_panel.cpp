@@ -50,13 +50,13 @@ void Panel::ocio(Model& model, std::vector<Command>& commands) {
     if (view.input == automatic) view.input.clear();
   }
   const std::string named = environment_variable("OCIO");
-  const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
   const bool two = any || !named.empty();
+  const float width = two ? Ui::width_beside("Open configuration", any ? "Remove configuration" : "Use $OCIO") : -1.0f;
   if (ui_.button("Open configuration", "Opens an OpenColorIO configuration (.ocio). Its view replaces the tone map.",
-                 {two ? width : -1.0f, 0.0f}))
+                 {width, 0.0f}))
     commands.push_back({Action::ocio_dialog});
   if (!two) return;
-  ImGui::SameLine();
+  if (width > 0.0f) ImGui::SameLine();
   if (any) {
     if (ui_.button("Remove configuration", "Uses the tone map again.", {width, 0.0f})) view = {};
   } else if (ui_.button("Use $OCIO", named.c_str(), {width, 0.0f})) {

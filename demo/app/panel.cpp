@@ -42,6 +42,14 @@ std::string clock_text(double hour) {
   return print("%d:%02d", minutes / 60, minutes % 60) + "  (%.2f h)";
 }
 
+/// Returns the first name of the form "Camera 1" that no camera has.
+std::string free_camera_name(const std::vector<NamedCamera>& cameras) {
+  for (std::size_t number = 1;; ++number) {
+    std::string name = std::string("Camera ").append(std::to_string(number));
+    if (std::ranges::find(cameras, name, &NamedCamera::name) == cameras.end()) return name;
+  }
+}
+
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 }  // namespace
@@ -309,24 +317,27 @@ void Panel::cameras(Model& model) {
   if (!cameras.empty() &&
       ui_.choose("Saved camera", "The saved camera that is shown, until the camera is moved.", choices, chosen))
     look_through(model.scene, cameras[static_cast<std::size_t>(chosen)].name);
-  bool keep = ui_.text("Camera name", "Name for saving the current view.", "name", camera_name_);
-  const float width = (ImGui::GetContentRegionAvail().x - ImGui::GetStyle().ItemSpacing.x) / 2.0f;
-  const bool can_keep = !camera_name_.empty() && !needs_fit(model.scene.camera);
+  const std::string free_name = free_camera_name(cameras);
+  bool keep = ui_.text("Camera name", "Name of the camera that is added.", free_name.c_str(), camera_name_);
+  const float width = chosen >= 0 ? Ui::width_beside("Add camera", "Remove camera") : -1.0f;
+  const bool can_keep = !needs_fit(model.scene.camera);
   ImGui::BeginDisabled(!can_keep);
   keep |=
-      ui_.button("Save camera", "Saves the current view as a camera of the scene; replaces a camera of the same name.",
+      ui_.button("Add camera", "Adds the current view as a camera of the scene; replaces a camera of the same name.",
                  {width, 0.0f});
   ImGui::EndDisabled();
   if (chosen >= 0) {
-    ImGui::SameLine();
-    if (ui_.button("Remove camera", "Removes the current camera from the saved cameras.", {width, 0.0f}))
+    if (width > 0.0f) ImGui::SameLine();
+    if (ui_.button("Remove camera", "Removes the saved camera that is shown.", {width, 0.0f}))
       cameras.erase(cameras.begin() + chosen);
   }
   if (!keep || !can_keep) return;
-  const auto same = std::ranges::find(cameras, camera_name_, &NamedCamera::name);
+  const std::string name = camera_name_.empty() ? free_name : camera_name_;
+  const auto same = std::ranges::find(cameras, name, &NamedCamera::name);
   NamedCamera& kept = same != cameras.end() ? *same : cameras.emplace_back();
   static_cast<SceneCamera&>(kept) = model.scene;
-  kept.name = camera_name_;
+  kept.name = name;
+  camera_name_.clear();
 }
 
 void Panel::camera(Model& model, std::vector<Command>& commands) {
@@ -470,14 +481,18 @@ void Panel::state_line(const Model& model) {
     if (cut == std::string::npos) break;
   }
   ImGui::TextUnformatted(shown.c_str());
-  ImGui::End();
-  ImGui::PopStyleVar();
-  // Rounded to whole pixels, because a smaller change would redraw the window without effect.
+  // Rounded to whole pixels, because a smaller change would redraw the window without effect. In this window's list, so
+  // that dialogs cover it.
   const double part = std::clamp(model.status.frame.progress, 0.0, 1.0);
-  ImGui::GetForegroundDrawList()->AddRectFilled(
+  ImDrawList& list = *ImGui::GetWindowDrawList();
+  list.PushClipRectFullScreen();
+  list.AddRectFilled(
       {static_cast<float>(view_.x), static_cast<float>(view_.y + view_.height) - ui_.px(2.0f)},
       {static_cast<float>(view_.x + std::floor(view_.width * part)), static_cast<float>(view_.y + view_.height)},
       IM_COL32(95, 143, 191, 200));
+  list.PopClipRect();
+  ImGui::End();
+  ImGui::PopStyleVar();
 }
 
 void Panel::help(Model& model) {

@@ -8,6 +8,7 @@
 #include "color_ramp_edit.hpp"
 #include "file_dialog.hpp"
 #include "grid_picker.hpp"
+#include "light_color_rows.hpp"
 #include "model.hpp"
 #include "outliner.hpp"
 #include "question.hpp"
@@ -15,6 +16,7 @@
 #include "render_dialog.hpp"
 #include "rows.hpp"
 #include "sun_path.hpp"
+#include "transform_rows.hpp"
 #include "ui.hpp"
 
 namespace cumulet::demo {
@@ -62,16 +64,15 @@ class Panel {
   void ocio(Model& model, std::vector<Command>& commands);
   void light(Model& model, std::vector<Command>& commands);
   void environment(Model& model, std::vector<Command>& commands);
-  /// Draws the transform of a volume.
-  void stand(SceneVolume& volume, std::size_t transform_index);
-  // Draws the rows of a transform. Returns the new transform if the user changed it.
-  std::optional<std::array<double, 16>> stand_at(const std::optional<std::array<double, 16>>& transform);
   void one_model(SceneModel& one);
-  void analytic_light(cumulet_light_desc& analytic_light);
+  void analytic_light(Model& model, cumulet_light_desc& analytic_light);
   void sequence(Model& model, std::vector<Command>& commands);
   /// Draws the timeline below the image: the frames, their states and the current frame.
   void timeline(Model& model, std::vector<Command>& commands);
-  // Draws the medium and the ramps of a volume. index: 0 for the first one.
+  // Draws the first row of the timeline: buttons, frame rate, frame and legend. other: not the current frame is
+  // displayed.
+  void transport(Model& model, bool other, std::vector<Command>& commands);
+  // Draws the medium and the ramps of a volume, in groups. index: 0 for the first one.
   void medium(Model& model, std::size_t index, std::vector<Command>& commands);
   // Draws the ramps of a volume. fields: the values of its grids.
   void ramps(Model& model, SceneVolume& volume, const Fields& fields);
@@ -87,6 +88,8 @@ class Panel {
   void sampling(Model& model);
   void advanced_sampling(Model& model);
   void statistics(const Model& model);
+  void scattering(cumulet_medium_desc& medium);
+  void fire(cumulet_medium_desc& medium, const SceneVolume& volume, const Fields& fields);
   void absorption(float (&coalbedo)[3]);
   void threshold(settings::SettingInfo info, cumulet_grid_desc& grid);
   void ground(Model& model);
@@ -106,6 +109,8 @@ class Panel {
   Ui ui_;
   Rows rows_{ui_};
   Outliner outliner_{ui_};
+  TransformRows transform_{ui_};
+  LightColorRows light_color_{ui_};
   std::array<RampView, settings::ramps.size()> ramp_views_;
   std::array<ColorRampView, settings::color_ramps.size()> color_ramp_views_;
   FileDialog dialog_;

@@ -95,6 +95,25 @@ void App::take_added(const Item& item) {
   loading_.added.push_back(item);
 }
 
+void App::drop_failed(const std::string& file) {
+  const auto& scene = model_.scene;
+  const auto is_of = [&](const Item& item) {
+    return item.kind == Item::Kind::model ? scene.models[item.index].file == file
+                                          : volume_at(scene, item.index).volume == file;
+  };
+  for (bool found = true; found;) {
+    const auto failed = std::ranges::find_if(loading_.added, is_of);
+    found = failed != loading_.added.end();
+    if (!found) break;
+    const Item item = *failed;
+    loading_.added.erase(failed);
+    remove_item(model_.scene, item);
+    for (Item& later : loading_.added)
+      if (later.kind == item.kind && later.index > item.index) --later.index;
+    deselect(model_);
+  }
+}
+
 void App::place_added() {
   for (const Item& item : std::exchange(loading_.added, {})) {
     if (!transform_of(model_.scene, item)) continue;

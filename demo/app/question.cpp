@@ -20,6 +20,7 @@ void Question::draw(Ui& ui, std::vector<Command>& commands) {
   const ImVec2 screen = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({screen.x * 0.5f, screen.y * 0.5f}, ImGuiCond_Always, {0.5f, 0.5f});
   ImGui::SetNextWindowSize({std::min(ui.px(440.0f), screen.x * 0.95f), 0.0f});
+  ImGui::SetNextWindowSizeConstraints({0.0f, 0.0f}, {screen.x, screen.y * 0.98f});
   open_ = ImGui::BeginPopupModal(
       id.c_str(), nullptr, ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_AlwaysAutoResize);
   const bool opened = std::exchange(opening_, false);

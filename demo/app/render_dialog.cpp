@@ -66,7 +66,7 @@ void RenderDialog::resolution(Ui& ui) {
 
 void RenderDialog::quality(Ui& ui) {
   ui.integer("Max samples", "Samples per pixel at most.", settings_.samples);
-  ui.slider("Noise limit", "Ends when the noise of the samples is this small.", settings_.noise_percent, 0.0f, 20.0f,
+  ui.slider("Noise target", "Ends when the noise of the samples is this small.", settings_.noise_percent, 0.0f, 20.0f,
             settings_.noise_percent > 0.0f ? "%.1f %%" : "none");
   ui.slider("Time limit", "Ends after this time per picture.", settings_.time_limit, 0.0f, 3600.0f,
             settings_.time_limit > 0.0f ? "%.0f s" : "none", ImGuiSliderFlags_Logarithmic);
@@ -76,7 +76,7 @@ void RenderDialog::quality(Ui& ui) {
       {"Fast", static_cast<int>(Denoise::fast), "A wavelet filter, as in the window."},
       {"High", static_cast<int>(Denoise::high),
        "A network of Open Image Denoise, if scripts/install_oidn_weights.sh has installed it."}};
-  if (ui.choose("Denoising", "Filter of the finished picture. For EXR an additional layer.", choices, denoise))
+  if (ui.choose("Denoise", "Filter of the finished picture. For EXR an additional layer.", choices, denoise))
     settings_.file.denoise = static_cast<Denoise>(denoise);
 }
 

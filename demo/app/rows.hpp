@@ -27,6 +27,8 @@ const Desc& default_of() {
       if constexpr (std::is_same_v<std::remove_cvref_t<decltype(group)>, Desc>) desc = group;
     });
     settings::spell_out_zeros(desc);
+    // Sequences that are opened in the demo are repeated.
+    if constexpr (std::is_same_v<Desc, cumulet_playback_desc>) desc.repeat = CUMULET_REPEAT_LOOP;
     return desc;
   }();
   return made;

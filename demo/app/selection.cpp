@@ -159,7 +159,43 @@ glm::dvec3 light_offset(const cumulet_camera_desc& camera) {
   return half_height * (0.55 * glm::normalize(glm::cross(backward, right)) + 0.4 * right + 0.4 * backward);
 }
 
+/// Returns the irradiance of a new light at the middle of the scene. The exposure makes it as bright in every image.
+double irradiance_in(const SceneOptions& scene) {
+  return new_light_irradiance * std::exp2(-static_cast<double>(scene.display.exposure_stops));
+}
+
+/// Returns the power of a light at this distance. A distant light's power is its irradiance.
+float power_of(cumulet_light_kind kind, double distance, const SceneOptions& scene) {
+  const double reach = distance > 0.0 ? distance : 1.0;
+  const double sphere = 4.0 * std::numbers::pi * reach * reach;
+  return static_cast<float>(irradiance_in(scene) * (kind == CUMULET_LIGHT_DISTANT ? 1.0 : sphere));
+}
+
 }  // namespace
+
+void adapt_light(cumulet_light_desc& light, cumulet_light_kind before, const SceneOptions& scene) {
+  constexpr double cone = 45.0;          // degrees
+  constexpr double relative_size = 0.3;  // of an area light, to its distance
+  const auto& target = scene.camera.target;
+  // A distant light of a scene file has no position.
+  if (before == CUMULET_LIGHT_DISTANT && light.position[0] == 0.0 && light.position[1] == 0.0 &&
+      light.position[2] == 0.0) {
+    glm::dvec3 direction(light.direction[0], light.direction[1], light.direction[2]);
+    direction = direction == glm::dvec3(0.0) ? glm::dvec3(0.0, -1.0, 0.0) : glm::normalize(direction);
+    const double reach = glm::length(light_offset(scene.camera));
+    for (int i = 0; i < 3; ++i) light.position[i] = target[i] - reach * direction[i];
+  }
+  const double distance =
+      std::hypot(light.position[0] - target[0], light.position[1] - target[1], light.position[2] - target[2]);
+  const bool distant = light.kind == CUMULET_LIGHT_DISTANT;
+  // W and W/m² differ by the square of the distance.
+  if (distant != (before == CUMULET_LIGHT_DISTANT)) light.power = power_of(light.kind, distance, scene);
+  if (light.kind == CUMULET_LIGHT_SPOT && light.angle_degrees == 0.0) light.angle_degrees = cone;
+  const bool is_area = light.kind == CUMULET_LIGHT_DISK || light.kind == CUMULET_LIGHT_RECT;
+  constexpr double standard = 1.0;  // of both sizes, which suits few scenes
+  if (!is_area || light.width != standard || light.height != standard || !(distance > 0.0)) return;
+  light.width = light.height = relative_size * distance;
+}
 
 void add_light(Model& model) {
   const cumulet_camera_desc& camera = model.scene.camera;
@@ -172,8 +208,7 @@ void add_light(Model& model) {
     light.position[i] = target[i] + offset[i];
     light.direction[i] = -offset[i] / distance;
   }
-  const double irradiance = new_light_irradiance * std::exp2(-static_cast<double>(model.scene.display.exposure_stops));
-  light.power = static_cast<float>(irradiance * 4.0 * std::numbers::pi * distance * distance);
+  light.power = power_of(light.kind, distance, model.scene);
   settings::spell_out_zeros(light);
   select(model, Item{Item::Kind::analytic_light, model.scene.analytic_lights.size() - 1, 0});
 }

@@ -37,5 +37,8 @@ bool reorder(Model& model, const Item& from, const Item& to);
 /// Adds a point light above the camera's target, and selects it. Its power suits the exposure: at 0 stops its
 /// irradiance at the target is half of the noon sun's.
 void add_light(Model& model);
+/// Gives a light whose kind the user has changed values that suit it: W and W/m² differ, a spot needs a cone, and an
+/// area light a size.
+void adapt_light(cumulet_light_desc& light, cumulet_light_kind before, const SceneOptions& scene);
 
 }  // namespace cumulet::demo

@@ -13,6 +13,13 @@ void SequenceClock::go_to(std::uint32_t index) {
   static_cast<void>(cumulet_sequence_get_time_of(play->sequence.get(), index, &model_.clock));
 }
 
+void SequenceClock::go_to_end(bool last) {
+  const auto& play = model_.status.play;
+  if (!play) return;
+  const cumulet_playback_desc playback = playback_of(model_.scene.sequence, play->row);
+  go_to(last ? playback.first_frame + std::max(playback.frame_count, 1U) - 1 : playback.first_frame);
+}
+
 void SequenceClock::step(int frames) {
   const auto& play = model_.status.play;
   if (!play) return;

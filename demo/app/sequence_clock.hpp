@@ -16,6 +16,8 @@ class SequenceClock {
 
   /// Shows the frame with this index in the sequence.
   void go_to(std::uint32_t index);
+  /// Shows the first or the last frame of the playback.
+  void go_to_end(bool last);
   /// Plays the sequence that the volume's file belongs to.
   void play_row();
   /// Plays or pauses. At the end of a sequence that is not repeated it starts again at the beginning.

@@ -2,38 +2,15 @@
 
 #include <imgui.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "icon_button.hpp"
+
 namespace cumulet::demo {
 namespace {
-
-/// Draws an icon in a square of 20 units around a center.
-class Pen {
- public:
-  Pen(ImDrawList& list, ImVec2 center, float unit, ImU32 color)
-      : list_(list), center_(center), unit_(unit), color_(color) {}
-
-  void line(ImVec2 from, ImVec2 to) const { list_.AddLine(at(from), at(to), color_, 1.6f * unit_); }
-  void triangle(ImVec2 a, ImVec2 b, ImVec2 c) const { list_.AddTriangleFilled(at(a), at(b), at(c), color_); }
-  void rectangle(ImVec2 low, ImVec2 high) const { list_.AddRect(at(low), at(high), color_, 0.0f, 0, 1.6f * unit_); }
-  void disk(ImVec2 middle, float radius) const { list_.AddCircleFilled(at(middle), radius * unit_, color_, 12); }
-  /// Angles in radians, clockwise from the right.
-  void arc(float radius, float from, float to) const {
-    list_.PathArcTo(center_, radius * unit_, from, to, 24);
-    list_.PathStroke(color_, 0, 1.6f * unit_);
-  }
-
- private:
-  [[nodiscard]] ImVec2 at(ImVec2 point) const { return {center_.x + point.x * unit_, center_.y + point.y * unit_}; }
-
-  ImDrawList& list_;
-  ImVec2 center_;
-  float unit_;
-  ImU32 color_;
-};
 
 void draw_select(const Pen& pen) {
   pen.triangle({-4.0f, -8.0f}, {-4.0f, 5.0f}, {5.0f, 2.0f});
@@ -123,28 +100,13 @@ const std::vector<Entry>& entries() {
   return all;
 }
 
-void draw_entry(Ui& ui, const Entry& entry, const Model& model, std::vector<Command>& commands) {
+void draw_entry(Ui& ui, const Entry& entry, float side, const Model& model, std::vector<Command>& commands) {
   const bool is_tool = entry.command.action == Action::tool;
   const bool active = is_tool && model.tool == static_cast<Tool>(entry.command.value);
-  const bool enabled = is_tool || model.status.has_content;
-  const ImVec2 corner = ImGui::GetCursorScreenPos();
-  const float size = ui.px(32.0f);
-  ImGui::BeginDisabled(!enabled);
-  if (ImGui::InvisibleButton((std::string("##") + entry.control).c_str(), {size, size}))
-    commands.push_back(entry.command);
-  ImGui::EndDisabled();
-  const bool hovered = ImGui::IsItemHovered();
   const std::string keys = keys_of(entry.command);
   const std::string tip = entry.tip + (keys.empty() ? "" : " (" + keys + ")");
-  ImDrawList& list = *ImGui::GetWindowDrawList();
-  const ImVec2 end(corner.x + size, corner.y + size);
-  if (active || (hovered && enabled))
-    list.AddRectFilled(corner, end, ImGui::GetColorU32(active ? ImGuiCol_ButtonActive : ImGuiCol_ButtonHovered),
-                       ui.px(4.0f));
-  const Pen pen(list, {corner.x + 0.5f * size, corner.y + 0.5f * size}, ui.px(1.0f),
-                ImGui::GetColorU32(enabled ? ImGuiCol_Text : ImGuiCol_TextDisabled));
-  entry.draw(pen);
-  ui.remember(entry.control, tip.c_str());
+  if (icon_button(ui, {entry.control, tip.c_str(), entry.draw, active, is_tool || model.status.has_content}, side))
+    commands.push_back(entry.command);
 }
 
 }  // namespace
@@ -160,9 +122,14 @@ void draw_tool_bar(Ui& ui, const Rectangle& view, const Model& model, std::vecto
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoFocusOnAppearing |
                    ImGuiWindowFlags_NoNav);
+  // Icons shrink in a low window, so that all of them are in it.
+  const auto count = static_cast<float>(entries().size());
+  const float gap = ui.px(4.0f) + ImGui::GetStyle().ItemSpacing.y * (count + 1.0f);
+  const float room = (ImGui::GetContentRegionAvail().y - gap) / count;
+  const float side = std::clamp(std::floor(room), ui.px(10.0f), ui.px(32.0f));
   for (const Entry& entry : entries()) {
     if (entry.command.action == Action::frame_all) ImGui::Dummy({0.0f, ui.px(4.0f)});
-    draw_entry(ui, entry, model, commands);
+    draw_entry(ui, entry, side, model, commands);
   }
   ImGui::End();
   ImGui::PopStyleVar(3);

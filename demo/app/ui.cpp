@@ -120,12 +120,15 @@ void Ui::remember(const char* label, const char* tip) {
   if (time_ - hovered_since_ < static_cast<double>(tip_delay) || ImGui::IsItemActive()) return;
   // Beside the panel or the dialog, so that it does not cover the next rows.
   const ImGuiWindow& root = *ImGui::GetCurrentWindow()->RootWindow;
-  if (&root == ImGui::FindWindowByName(panel_name))
+  float wrap = px(300.0f);
+  if (&root == ImGui::FindWindowByName(panel_name)) {
     ImGui::SetNextWindowPos({root.Pos.x - px(8.0f), least.y}, ImGuiCond_Always, {1.0f, 0.0f});
-  else if ((root.Flags & ImGuiWindowFlags_Modal) != 0)
+    wrap = std::min(wrap, root.Pos.x - px(8.0f) - 2.0f * ImGui::GetStyle().WindowPadding.x);
+  } else if ((root.Flags & ImGuiWindowFlags_Modal) != 0) {
     place_tip_beside(root, least.y);
+  }
   ImGui::BeginTooltip();
-  ImGui::PushTextWrapPos(px(300.0f));
+  ImGui::PushTextWrapPos(std::max(wrap, px(60.0f)));
   ImGui::TextUnformatted(tip);
   ImGui::PopTextWrapPos();
   ImGui::EndTooltip();
@@ -135,14 +138,16 @@ bool Ui::resets(bool differs) const {
   if (!differs) return false;
   const ImVec2 corner = ImGui::GetItemRectMin();
   const float middle = corner.y + 0.5f * ImGui::GetFrameHeight();
-  const ImVec2 dot(corner.x - px(8.0f), middle);
+  ImVec2 dot(corner.x - px(8.0f), middle);
+  // Below its label, the control begins at the edge.
+  if (dot.x < ImGui::GetCurrentWindow()->ClipRect.Min.x) dot = {corner.x + px(5.0f), corner.y + px(5.0f)};
   ImGui::GetWindowDrawList()->AddCircleFilled(dot, px(2.0f), color_of(ImGuiCol_CheckMark), 12);
   return ImGui::IsItemHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Right);
 }
 
-bool Ui::section(const char* label, bool open) {
+bool Ui::section(const char* label, bool open, const char* control) {
   const bool is_open = ImGui::CollapsingHeader(label, open ? ImGuiTreeNodeFlags_DefaultOpen : 0);
-  remember(label, nullptr);
+  remember(control != nullptr ? control : label, nullptr);
   return is_open;
 }
 
@@ -152,11 +157,23 @@ void Ui::heading(const char* text) {
   ImGui::PopStyleColor();
 }
 
+bool Ui::is_narrow() const { return ImGui::GetContentRegionAvail().x < px(232.0f); }
+
 void Ui::begin_row(const char* label) const {
-  ImGui::AlignTextToFramePadding();
+  const bool narrow = is_narrow();
+  if (!narrow) ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(label, ImGui::FindRenderedTextEnd(label));
-  ImGui::SameLine(px(132.0f));
+  if (!narrow) ImGui::SameLine(px(132.0f));
   ImGui::SetNextItemWidth(-1.0f);
+}
+
+float Ui::width_beside(const char* label, const char* other) {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float width = (ImGui::GetContentRegionAvail().x - style.ItemSpacing.x) / 2.0f;
+  const auto needs = [&](const char* text) {
+    return ImGui::CalcTextSize(text, nullptr, true).x + 2.0f * style.FramePadding.x;
+  };
+  return std::max(needs(label), needs(other)) <= width ? width : -1.0f;
 }
 
 bool Ui::button(const char* label, const char* tip, ImVec2 size) {
@@ -166,7 +183,13 @@ bool Ui::button(const char* label, const char* tip, ImVec2 size) {
 }
 
 bool Ui::checkbox(const char* label, const char* tip, bool& value) {
-  begin_row(label);
+  if (is_narrow()) {
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextUnformatted(label, ImGui::FindRenderedTextEnd(label));
+    ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::GetFrameHeight());
+  } else {
+    begin_row(label);
+  }
   const bool changed = ImGui::Checkbox((std::string("##") + label).c_str(), &value);
   remember(label, tip);
   return changed;
@@ -653,8 +676,9 @@ void Ui::plot(const char* label, const char* tip, const std::vector<float>& valu
 }
 
 void Ui::value_row(const char* label, const std::string& value) {
+  const bool narrow = is_narrow();
   heading(label);
-  ImGui::SameLine(px(132.0f));
+  if (!narrow) ImGui::SameLine(px(132.0f));
   ImGui::PushTextWrapPos(0.0f);
   ImGui::TextUnformatted(value.c_str());
   ImGui::PopTextWrapPos();

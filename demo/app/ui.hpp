@@ -30,8 +30,8 @@ struct Choice {
   const char* tip;
 };
 
-/// Controls of the demo, based on Dear ImGui. Each has a label on the left, the control on the right and a tooltip.
-/// Positions are stored by label, for replay files. Needs a current ImGui context.
+/// Controls of the demo, based on Dear ImGui. Each has a tooltip and a label, on the left of the control or, in a
+/// narrow panel, above it. Positions are stored by label, for replay files. Needs a current ImGui context.
 class Ui {
  public:
   /// Call between ImGui::NewFrame and the first control. scale: user interface scale; time: seconds.
@@ -40,9 +40,17 @@ class Ui {
   /// Converts a length at scale 1 to pixels.
   [[nodiscard]] float px(float length) const { return length * scale_; }
 
-  bool section(const char* label, bool open);
+  /// control: its name for replay files; null: the label.
+  bool section(const char* label, bool open, const char* control = nullptr);
+  /// Draws a section with its content, if it is open.
+  template <class Content>
+  void group(const char* label, bool open, const char* control, const Content& content) {
+    if (section(label, open, control)) content();
+  }
   static void heading(const char* text);
   bool button(const char* label, const char* tip, ImVec2 size = {});
+  /// Returns the width of each of two buttons that fill a row; -1 if a label needs more, so that each gets its own row.
+  static float width_beside(const char* label, const char* other);
   bool checkbox(const char* label, const char* tip, bool& value);
   /// Draws a slider. A double click or Ctrl+click types a number, and a drag with Shift is fine. typed: range of typed
   /// numbers; nullopt: the slider's range.
@@ -116,6 +124,8 @@ class Ui {
   void bring_into_view(const std::string& label) { wanted_ = label; }
 
  private:
+  /// Returns true if the labels are above their controls.
+  [[nodiscard]] bool is_narrow() const;
   void begin_row(const char* label) const;
   // Places the next tooltip beside or below a dialog, if there is room.
   void place_tip_beside(const ImGuiWindow& dialog, float y) const;

@@ -33,6 +33,7 @@ void App::new_scene() {
   derived_ = {};
   loading_.suggest = true;
   model_.unchosen_ground = true;
+  scene.sequence.playback.repeat = CUMULET_REPEAT_LOOP;
   show(std::move(scene), "");
 }
 

@@ -123,7 +123,7 @@ void parse_sky_model(std::string_view text, cumulet_sun_sky_desc& light) {
   const auto take = [&](float cumulet_sun_sky_desc::*field, double number) {
     settings::with(field, [&](const auto& setting) {
       if (!setting.given_range().holds(number))
-        throw UsageError(std::string(setting.row.label) + " " + setting.given_range().refusal());
+        throw UsageError(std::string(setting.name) + " " + setting.given_range().refusal());
     });
     light.*field = static_cast<float>(number);
   };

@@ -49,17 +49,15 @@ inline constexpr std::array ramps = {
     RampInfo{"density", "medium.density_ramp", "--density-ramp",
              "Remaps the density (transfer function), linear between points: \"0:0,0.1:0,1:1\" removes thin smoke "
              "(default: none)",
-             "Density ramp",
-             "Remap curve (transfer function) of the density grid, before the density scale. 0 stays 0.",
+             "Density ramp", "Curve (transfer function) that changes the values of the density grid. 0 stays 0.",
              "Density point"},
     RampInfo{"temperature", "medium.temperature_ramp", "--temperature-ramp",
              "Remaps the temperature grid, before scale and offset (default: none)", "Temperature ramp",
-             "Remap curve (transfer function) of the temperature grid, before scale and offset. 0 stays 0.",
+             "Curve (transfer function) that changes the values of the temperature grid. 0 stays 0.",
              "Temperature point"},
     RampInfo{"flame", "medium.flame_ramp", "--flame-ramp",
              "Remaps the flame grid, before the flame strength (default: none)", "Flame ramp",
-             "Remap curve (transfer function) of the flame grid, before the flame strength. 0 stays 0.",
-             "Flame point"}};
+             "Curve (transfer function) that changes the values of the flame grid. 0 stays 0.", "Flame point"}};
 static_assert(CUMULET_RAMP_DENSITY == 0 && CUMULET_RAMP_TEMPERATURE == 1 && CUMULET_RAMP_FLAME == 2);
 
 /// The names and texts of a color ramp; fields as in SettingInfo.
@@ -79,18 +77,18 @@ inline constexpr std::array color_ramps = {
                   "Colors of scattered light by density, a factor of the albedo: \"0:#80a0ff,1:1/0.8/0.6\", sRGB or "
                   "linear (default: none)",
                   "Density colors",
-                  "Scatter color for each value of the density grid. It multiplies the albedo. The density ramp does "
+                  "Color for each value of the density grid. It multiplies the scatter color. The density ramp does "
                   "not move it.",
                   1.0F},
     ColorRampInfo{"temperature", "medium.temperature_color_ramp", "--temperature-color-ramp",
                   "Colors of emitted light by temperature, instead of those of black bodies (default: none)",
                   "Temperature colors",
-                  "Emission color for each value of the temperature grid, instead of that of a black body. The black "
-                  "body sets the brightness.",
+                  "Color of the fire for each value of the temperature grid, instead of that of its heat. Fire "
+                  "brightness sets the brightness.",
                   1e30F},
     ColorRampInfo{"flame", "medium.flame_color_ramp", "--flame-color-ramp",
                   "Colors of emitted light by flame, instead of the flame color (default: none)", "Flame colors",
-                  "Emission color for each value of the flame grid, instead of the flame color.", 1e30F}};
+                  "Color of the flame for each value of the flame grid, instead of the flame color.", 1e30F}};
 static_assert(color_ramps.size() == ramps.size());
 
 inline constexpr std::size_t max_ramp_points = 32;

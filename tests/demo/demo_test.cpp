@@ -154,7 +154,7 @@ TEST(UndoHistory, StepsHaveNames) {
     change(after);
     return change_name(before, after);
   };
-  EXPECT_EQ(name([](SceneOptions& scene) { scene.medium.density_scale = 7.0; }), "Density scale");
+  EXPECT_EQ(name([](SceneOptions& scene) { scene.medium.density_scale = 7.0; }), "Density");
   EXPECT_EQ(name([](SceneOptions& scene) { scene.volume = "/a/cloud.vdb"; }), "Open cloud.vdb");
   EXPECT_EQ(name([](SceneOptions& scene) { scene.analytic_lights.emplace_back(); }), "Add light");
   EXPECT_EQ(name([](SceneOptions& scene) { scene.camera.eye[0] += 1.0; }), "Camera");
@@ -167,9 +167,9 @@ TEST(UndoHistory, StepsHaveNames) {
   EXPECT_FALSE(history.undo_name(before));
   SceneOptions after = before;
   after.medium.anisotropy = 0.3f;
-  EXPECT_EQ(history.undo_name(after), "Anisotropy");
+  EXPECT_EQ(history.undo_name(after), "Scatter direction");
   EXPECT_TRUE(history.undo(after));
-  EXPECT_EQ(history.redo_name(), "Anisotropy");
+  EXPECT_EQ(history.redo_name(), "Scatter direction");
 }
 
 TEST(UndoHistory, IsBounded) {

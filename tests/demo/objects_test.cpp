@@ -44,6 +44,8 @@ class ObjectsTest : public cumulet::test::PanelTest {
 
 TEST_P(ObjectsTest, EachVolumeHasItsOwnRamps) {
   add_volume();
+  frame();
+  open_ramps();
   show("Temperature colors");
   EXPECT_FALSE(has("Flame ramp") || has("Flame colors")) << "it has no flames";
   click("Temperature colors");
@@ -63,7 +65,7 @@ TEST_P(ObjectsTest, EachVolumeHasItsOwnRamps) {
 
 TEST_P(ObjectsTest, TheMediumOfAnotherVolumeBeginsWithWhatItsFileSuggests) {
   add_volume();
-  show("Max bounces");
+  show("Auto density");
   EXPECT_FALSE(has("Max bounces")) << "the first volume's applies to all";
   EXPECT_TRUE(model_.scene.others[0].auto_density_scale);
   EXPECT_EQ(model_.scene.others[0].medium.density_scale, 0.0) << "to look at it changes nothing";

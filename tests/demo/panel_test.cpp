@@ -41,7 +41,7 @@ TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnArea) {
 TEST_P(PanelTest, LabelsFitBesideTheirControls) {
   frame();
   frame();
-  for (const char* label : {"Camera adaptive", "Sun elevation", "Density scale", "GPU memory", "Background"}) {
+  for (const char* label : {"Camera adaptive", "Sun elevation", "Density", "GPU memory", "Background"}) {
     EXPECT_LT(ImGui::GetFont()->CalcTextSizeA(ImGui::GetFontSize(), 1e9f, 0.0f, label).x, panel_.ui().px(126.0f))
         << label;
   }
@@ -124,7 +124,7 @@ TEST_P(PanelTest, MenusIssueTheirCommands) {
   click("File/Open...");
   ASSERT_EQ(commands_.size(), 1u);
   EXPECT_EQ(commands_[0].action, Action::open_dialog);
-  model_.undo = "Density scale";
+  model_.undo = "Density";
   click("Edit");
   click("Edit/Undo");
   ASSERT_EQ(commands_.size(), 2u);
@@ -136,11 +136,11 @@ TEST_P(PanelTest, OutlinerSelectsHidesAndDeletes) {
   frame();
   frame();
   EXPECT_EQ(subject_of(model_), Subject(Item{Item::Kind::volume, 0, 0})) << "the first object, until the user selects";
-  EXPECT_TRUE(panel_.ui().controls().contains("Density scale"));
+  EXPECT_TRUE(panel_.ui().controls().contains("Density"));
   EXPECT_FALSE(model_.chosen);
   click("Scene/Sun & sky");
   EXPECT_TRUE(panel_.ui().controls().contains("Sun dial"));
-  EXPECT_FALSE(panel_.ui().controls().contains("Density scale"));
+  EXPECT_FALSE(panel_.ui().controls().contains("Density"));
   panel_.ui().bring_into_view("Eye/Volume 1");
   for (int i = 0; i < 3; ++i) frame();
   click("Eye/Volume 1");
@@ -237,6 +237,7 @@ TEST_P(PanelTest, ColorRampsAreEdited) {
       frame();
     }
   };
+  open_ramps();
   show("Temperature colors");
   click("Temperature colors");
   ASSERT_GE(stops.size(), 3u);
@@ -284,14 +285,14 @@ TEST_P(PanelTest, RightClickResetsASetting) {
   click("Exposure", ImGuiMouseButton_Right);
   EXPECT_EQ(model_.scene.display.exposure_stops, 0.0f);
   select(model_, Part::sun_sky);
-  panel_.ui().bring_into_view("Turbidity");
+  panel_.ui().bring_into_view("Haze");
   for (int i = 0; i < 4; ++i) frame();
   model_.scene.light.sky = CUMULET_SKY_PHYSICAL;
   model_.scene.light.turbidity = 9.0f;
   frame();
-  panel_.ui().bring_into_view("Turbidity");
+  panel_.ui().bring_into_view("Haze");
   for (int i = 0; i < 4; ++i) frame();
-  click("Turbidity", ImGuiMouseButton_Right);
+  click("Haze", ImGuiMouseButton_Right);
   EXPECT_EQ(model_.scene.light.turbidity, default_of<cumulet_sun_sky_desc>().turbidity);
 }
 
@@ -392,8 +393,8 @@ TEST(Menus, ReachEveryAction) {
       Action::choose_grid,    Action::discard_recovery, Action::clear_log,     Action::render,
       Action::show_in_folder, Action::quit_anyway,      Action::cancel_render, Action::clear_renders,
       Action::daylight,       Action::keep_place,       Action::follow_light,  Action::open_sample,
-      Action::ocio_dialog,    Action::open_ocio};
-  for (int i = 0; i <= static_cast<int>(Action::keep_place); ++i) {
+      Action::ocio_dialog,    Action::open_ocio,        Action::go_to};
+  for (int i = 0; i <= static_cast<int>(Action::about); ++i) {
     const auto action = static_cast<Action>(i);
     const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {
       return std::ranges::any_of(

@@ -154,6 +154,35 @@ TEST(Selection, ANewLightSuitsTheExposure) {
   EXPECT_FLOAT_EQ(light_at(3.0f).power, made.power / 8.0f);
 }
 
+// A distant light that became a point light kept its W/m² as W, and was black.
+TEST(Selection, ALightOfAnotherKindKeepsItsBrightness) {
+  Model model;
+  model.scene.camera.eye[2] = 10.0;
+  add_light(model);
+  cumulet_light_desc& light = model.scene.analytic_lights.at(0);
+  const float watts = light.power;
+  light.kind = CUMULET_LIGHT_DISTANT;
+  adapt_light(light, CUMULET_LIGHT_POINT, model.scene);
+  EXPECT_FLOAT_EQ(light.power, 2.0f);
+  light.kind = CUMULET_LIGHT_RECT;
+  adapt_light(light, CUMULET_LIGHT_DISTANT, model.scene);
+  EXPECT_NEAR(light.power, watts, 1e-4f * watts);
+  const double distance = std::hypot(light.position[0], light.position[1], light.position[2]);
+  EXPECT_NEAR(light.width, 0.3 * distance, 1e-9) << "a size that suits the scene";
+  EXPECT_EQ(light.height, light.width);
+  light.kind = CUMULET_LIGHT_DISK;
+  light.width = 7.0;
+  adapt_light(light, CUMULET_LIGHT_RECT, model.scene);
+  EXPECT_EQ(light.width, 7.0) << "the user's";
+  EXPECT_NEAR(light.power, watts, 1e-4f * watts);
+  cumulet_light_desc sun{};
+  sun.struct_size = sizeof sun;
+  sun.direction[1] = -2.0;
+  adapt_light(sun, CUMULET_LIGHT_DISTANT, model.scene);
+  EXPECT_GT(sun.position[1], 0.5) << "above the target, from where the sun shone";
+  EXPECT_GT(sun.power, 2.0f);
+}
+
 TEST(Selection, ANewLightIsInView) {
   struct View {
     std::array<double, 3> eye;

@@ -72,7 +72,7 @@ def test_region(s):
 
 
 def test_change(s):
-    s.play("replay", [*SETTLE, *shot("first"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.3 0.5',
+    s.play("replay", [*SETTLE, *shot("first"), 'drag "Density" 0.5 0.5 to "Density" 0.3 0.5',
                       "move viewport 0.5 0.5", *SETTLE, *shot("thin"), "key ctrl+z", *SETTLE, *shot("thick"), "key n", *SETTLE, *shot("wide"), "key n",
                       *shown("Sun & sky"), 'drag "Sun dial" 0.66 0.53 to "Sun dial" 0.3 0.5', *SETTLE, *shot("sun"), *shown("Render"), 'click "Tone map"',
                       "frames 2", 'click "Tone map/Filmic"', "frames 2", *shot("filmic"), *tab("Advanced"),
@@ -222,7 +222,7 @@ def test_scene_file(s):
     # A camera is saved, left and selected again.
     view = [*shown("Camera"), 'click "Camera name"', "frames 2", 'text "near"', "key enter", "frames 3", "drag viewport 0.5 0.5 to viewport 0.3 0.3",
             "frames 3", 'click "Saved camera"', "frames 2", 'click "Saved camera/near"', "frames 3"]
-    s.play("save", ["wait loaded", 'drag "Density scale" to "Density scale" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
+    s.play("save", ["wait loaded", 'drag "Density" to "Density" 0.55 0.5', "drag viewport 0.3 0.5 to viewport 0.5 0.6",
                     *view, "key ]", "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/scene.json"', "key enter", "frames 3",
                     "wait loaded", "wait converged", "key escape", "frames 2", *shot("saved"), "key ctrl+f12", "frames 2",
                     "key ctrl+a", f'text "{s.out}/picture.png"', "key enter", "frames 3", "key shift+f12", "frames 2", "key ctrl+a", f'text "{s.out}/picture.exr"', "key enter",

@@ -153,8 +153,8 @@ def test_handles(s):
 
 
 def test_timeline(s):
-    """A numbered file is a single frame until the user makes it a sequence, which plays once. The sequence is stepped,
-    played, scrubbed, trimmed and saved."""
+    """A numbered file is a single frame until the user makes it a sequence, which plays in a loop. The sequence is
+    stepped, played, scrubbed, trimmed and saved. A frame that cannot be read is reported once."""
     frames = [f"fire_{number:02}.vdb" for number in range(3, 9)]
     for number, name in enumerate(frames):
         # Frame 3 is the explosion, 4 is missing, 5 the cloud, 6 corrupt, 7 the explosion, 8 the cloud.
@@ -166,25 +166,31 @@ def test_timeline(s):
     quick = ["--spp", "2", "--albedo", "0.5,0.5,0.5", "--max-bounces", "2"]
     size = ["--size", "640x260"]
     s.play("timeline",
-           [*there, *shot("alone"), *tab("Sequence"), 'click "Play the sequence"', "frames 30", *there, *shot("opened"),
+           [*there, *shot("alone"), *tab("Sequence"), 'click "Play the sequence"', "frames 3", "wait loaded", "frames 60", *shot("looping"),
+            'click "Last"', *there, *shot("opened"), 'click "First"', *there, 'report "begin.json"', 'click "Last"', *there,
             "key ,", "key ,", "key ,", *there, "key .", *there, *shot("next"), "key ,", "key ,", *there, *shot("missing"),
-            "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Repeat"', "frames 2",
-            'click "Repeat/Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
+            "key o", "key ctrl+z", "frames 2", 'report "undone.json"', "key i", 'click "Loop"', "frames 2",
+            'report "held.json"', 'click "Loop"', "frames 2", "key space", "frames 60", 'report "playing.json"', "key space", *there,
             'click "Playhead" 0.99 0.5', "key escape", "key escape", *there, *shot("scrubbed"), "key ctrl+s", "frames 2", "key ctrl+a",
             f'text "{s.out}/played.json"', "key enter", "frames 3",
             'click "Playhead" 0.01 0.5', *there, "key space", "frames 12", "key space", *there, 'report "again.json"'],
            "fire_05.vdb", *quick, size=size)
     alone, opened, following, missing = (s.report(name) for name in ("alone", "opened", "next", "missing"))
     assert "sequence" not in alone and alone["neighbours"] == 6, alone
+    looping = s.report("looping")
+    assert looping["sequence"]["playing"] and looping["sequence"]["repeat"] == 1, looping["sequence"]
+    assert looping["sequence"]["clock"] > 3 * 6 / 24, f"it has played three times: {looping['sequence']}"
     assert opened["sequence"]["frame"] == opened["sequence"]["drawn"] == 8, opened["sequence"]
-    assert opened["sequence"]["clock"] > 0.0 and not opened["sequence"]["playing"], opened["sequence"]
+    assert not opened["sequence"]["playing"] and s.report("begin")["sequence"]["frame"] == 3, opened["sequence"]
+    assert s.report("held")["sequence"]["repeat"] == 0, "the button turns the loop off"
     assert opened["sequence"]["first"] == 3 and opened["sequence"]["count"] == 6, opened["sequence"]
     assert opened["viewport"][3] < alone["viewport"][3], "the timeline is below the picture"
     assert following["sequence"]["frame"] == 6 and following["sequence"]["drawn"] == 5, "the one before stands in"
     assert "fire_06.vdb" in following["sequence"]["failure"], following["sequence"]
     assert missing["sequence"]["frame"] == 4 and missing["sequence"]["drawn"] == 3, missing["sequence"]
     assert missing["sequence"]["ready"] == 4 and missing["sequence"]["failed"] == 2, missing["sequence"]
-    assert any("fire_04.vdb" in message["text"] for message in opened["messages"]), opened["messages"]
+    for name in ("fire_04.vdb", "fire_06.vdb"):
+        assert [name in line for line in s.report("again")["log"]].count(True) == 1, (name, s.report("again")["log"])
     assert s.report("undone")["sequence"]["last_played"] is None, "the range is undone"
     assert s.report("undone")["sequence"]["frame"] == 4, "and the playhead is not"
     playing = s.report("playing")["sequence"]
@@ -217,7 +223,7 @@ def test_timeline(s):
     s.play("kept", [*there, 'drop "cut.vdb"', *there, 'report "cut.json"', 'drop "cut_#.vdb"', *there, 'report "all.json"',
                     *(["key .", "frames 3"] * 5), *there,
                     "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/beside.json"', "key enter", "frames 3",
-                    "key space", "frames 3", 'report "begun.json"'],
+                    'click "Loop"', "frames 2", "key space", "frames 3", 'report "begun.json"'],
            "fire_##.vdb", "--gltf", str(mountains), "--spp", "1", size=size)
     for name, cause in (("cut", "cut.vdb"), ("all", "cut_1.vdb")):
         report = s.report(name)
@@ -289,7 +295,7 @@ def test_grids(s):
     """The panel lists a file's grids and shows each of them, with a suitable density scale."""
     s.play("replay", ["wait loaded", *shot("opened"), *tab("Grids"), 'click "Inspect grids"', "frames 2", "idle 3", *shot("picker"),
                       'click "Grids/temperature"', "frames 3", "wait loaded", *shot("temperature"),
-                      *tab("Material"), 'drag "Density scale" 0.5 0.5 to "Density scale" 0.9 0.5', "frames 3", *shot("dense"),
+                      *tab("Material"), 'drag "Density" 0.5 0.5 to "Density" 0.9 0.5', "frames 3", *shot("dense"),
                       'click "Auto density"', "frames 5", *shot("auto"), "key ctrl+z", "frames 5", *shot("undone"),
                       "key ctrl+z", "frames 3", "key ctrl+z", "frames 3", "wait loaded", *shot("back")],
            "--density-scale", "auto", "--volume", s.explosion)
@@ -325,6 +331,39 @@ def test_unnamed_grids(s):
     # A file with a density grid opens no dialog.
     s.play("named", ["frames 3", f'drop "{s.explosion}"', "frames 3", "wait loaded", "frames 2", "idle 1", *shot("named")])
     assert not s.report("named")["dialog"] and s.report("named")["grid"] == "density"
+
+
+def test_clip_turns(s):
+    """A clip turns with the up axis of its volume, as part of the same undo step."""
+    clip = {"box": [-9, -8, -7, 4, 5, 6], "planes": [[0, -1, 0, 2]]}
+    (s.out / "one.json").write_text(json.dumps({
+        "cumulet_scene": 3, "volumes": [{"file": s.explosion, "clip": clip}], "camera": {"eye": [0, 5, 30], "target": [0, 3, 0]}}))
+    up = lambda axis, name: ['click "Up axis"', "frames 2", f'click "Up axis/{axis}"', "frames 3", "wait loaded", "frames 2",
+                             f'report "{name}.json"']
+    s.play("replay", ["wait loaded", *tab("Grids"), *up("Z", "z"), *up("Y", "y"), "key ctrl+z", "frames 3", "wait loaded",
+                      'report "undone.json"'], "--scene", "one.json", "--spp", "1")
+    volume = lambda name: s.report(name)["volumes"][0]
+    turned = {"box": [-9, -7, -5, 4, 6, 8], "planes": [[0, 0, 1, 2]]}
+    assert volume("z")["up"] == "z" and volume("z")["clip"] == turned, volume("z")
+    assert volume("y").get("up", "y") == "y" and volume("y")["clip"] == clip, volume("y")
+    assert volume("undone")["clip"] == turned and s.report("undone")["undo_steps"] == 1, volume("undone")
+
+
+def test_added_fails(s):
+    """An object that is added is removed again if its file cannot be opened, and is no undo step. A later one is
+    added."""
+    for name in ("bad.vdb", "bad.glb"):
+        (s.out / name).write_bytes(b"nothing")
+    add = lambda kind, file, report: [f'click "Add {kind}"', "frames 3", "key ctrl+a", f'text "{file}"', "key enter", "frames 3",
+                                      "wait loaded", "frames 3", f'report "{report}.json"', "key escape", "frames 2"]
+    s.play("replay", ["wait loaded", "frames 3", *add("volume", s.out / "bad.vdb", "volume"), *add("model", s.out / "bad.glb", "model"),
+                      *add("volume", s.explosion, "added")], "--volume", s.cumulus, "--spp", "1")
+    for name, file in (("volume", "bad.vdb"), ("model", "bad.glb")):
+        report = s.report(name)
+        assert [m["text"] for m in report["messages"] if m["error"] and file in m["text"]], report["messages"]
+        assert len(report["volumes"]) == 1 and report["models"] == [] and report["undo_steps"] == 0, report["volumes"]
+    added = s.report("added")
+    assert len(added["volumes"]) == 2 and added["undo_steps"] == 1 and added["chosen"] == "Volume 2", added["volumes"]
 
 
 def test_up_axis(s):

@@ -79,8 +79,9 @@ def test_lamps(s):
     """A light is added, made a spot light, dimmed and removed. Each is a step that can be undone and redone."""
     there = ["frames 3", "wait loaded", "frames 2"]
     # Hides handles and icons, because the images are compared.
-    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', "move viewport 0.5 0.5", *SETTLE, *shot("point"), 'click "Light"', "frames 2",
-                      'click "Light/Spot"', *there, 'report "spot.json"', 'drag "Power" 0.5 0.5 to "Power" 0.3 0.5', "move viewport 0.5 0.5",
+    s.play("replay", ["key q", *SETTLE, *shot("day"), 'click "Add light"', "move viewport 0.5 0.5", *SETTLE, *shot("point"), 'click "Light type"', "frames 2",
+                      'click "Light type/Spot"', *there, 'report "spot.json"', 'click "Color by"', "frames 2", 'click "Color by/Temperature"', "frames 2",
+                      'drag "Color temperature" 0.5 0.5 to "Color temperature" 0.05 0.5', *there, 'report "warm.json"', "key ctrl+z", "key ctrl+z", *there, 'drag "Power" 0.5 0.5 to "Power" 0.3 0.5', "move viewport 0.5 0.5",
                       *SETTLE, *shot("dim"), "key ctrl+z", *there, 'report "bright.json"', "key ctrl+z", "key ctrl+z", *there,
                       'report "undone.json"', "key ctrl+shift+z", *SETTLE, *shot("redone"), "key delete",
                       *SETTLE, *shot("removed"), "key ctrl+z", *there, 'report "again.json"',
@@ -103,6 +104,9 @@ def test_lamps(s):
     assert_differ(day, shone, area)
     (spot,) = lights("spot")
     assert spot == dict(point, kind="spot", angle_degrees=45.0) and steps("spot") == 2, spot
+    (warm,) = lights("warm")
+    red, green, blue = warm["color"]
+    assert red > green > blue and warm == dict(spot, color=warm["color"]) and steps("warm") == 4, warm
     (dim,) = lights("dim")
     assert 0.0 < dim["power"] < 0.1 * spot["power"] and dim == dict(spot, power=dim["power"]), dim
     assert steps("dim") == 3, "a drag is one step"
@@ -125,7 +129,7 @@ def test_sky_and_ground(s):
     choose = lambda row, entry: [f'click "{row}"', "frames 2", f'click "{row}/{entry}"']
     there = ["frames 3", "wait loaded", "frames 2"]
     tell = lambda name: [*there, f'report "{name}.json"']
-    s.play("replay", [*SETTLE, *shot("day"), *shown("Sun & sky"), drag("Turbidity", 0.95), *SETTLE, *shot("haze"), *choose("Sky", "Constant"), *SETTLE,
+    s.play("replay", [*SETTLE, *shot("day"), *shown("Sun & sky"), drag("Haze", 0.95), *SETTLE, *shot("haze"), *choose("Sky", "Constant"), *SETTLE,
                       *shot("constant"), "key ctrl+z", *tell("hazy"), "key ctrl+z", *SETTLE, *shot("undone"),
                       "key ctrl+shift+z", "key ctrl+shift+z", *tell("redone"), *choose("Sky", "Physical"), *tell("physical"),
                       *shown("Ground"), *choose("Ground", "At a height"), *SETTLE, *shot("at_0"), drag("Ground height", 0.4), *tell("lower"),
@@ -157,7 +161,7 @@ def test_sky_and_ground(s):
 
 
 def test_glow(s):
-    s.play("replay", [*SETTLE, *shot("dark"), 'drag "Emission" 0.02 0.5 to "Emission" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
+    s.play("replay", [*SETTLE, *shot("dark"), *shown("Emission", "Material/"), 'drag "Emission" 0.02 0.5 to "Emission" 0.6 0.5', *SETTLE, *shot("glowing"), "key ctrl+z",
                       *SETTLE, *shot("undone")], "--volume", s.explosion, "--flame-grid", "none", "--spp", "16")
     dark, report, area = look(s, "dark")
     glowing, glowing_report, _ = look(s, "glowing")
@@ -223,10 +227,11 @@ def test_ramps(s):
     """A ramp with the grid's own values changes nothing. Points are dragged, added by clicks and removed by right
     clicks."""
     curve = '"Temperature ramp curve"'
-    s.play("replay", [*SETTLE, *shot("plain"), 'click "Temperature ramp"', *SETTLE, *shot("same"),
+    away = "move viewport 0.5 0.03"  # no hint covers the image
+    s.play("replay", [*SETTLE, *shot("plain"), *shown("Ramps", "Material/"), 'click "Temperature ramp"', away, *SETTLE, *shot("same"),
                       'move "Temperature point"', f"drag {curve} 0.02 0.95 to {curve} 0.6 0.97", *SETTLE, *shot("dragged"),
                       f"click {curve} 0.8 0.97", *SETTLE, *shot("added"), "key ctrl+z", *SETTLE, *shot("undone"), "key ctrl+shift+z", *SETTLE, 'report "redone.json"',
-                      f"click {curve} 0.8 0.97 right", *SETTLE, 'report "removed.json"', 'click "Temperature ramp"', *SETTLE,
+                      f"click {curve} 0.8 0.97 right", *SETTLE, 'report "removed.json"', 'click "Temperature ramp"', away, *SETTLE,
                       *shot("off")],
            "--volume", s.explosion, "--preset", "explosion", "--density-scale", "9", "--spp", "4", size=["--size", "640x460"])
     plain, report, area = look(s, "plain")
@@ -252,7 +257,7 @@ def test_ramps(s):
 def test_ramp_shapes(s):
     """A ramp takes a common shape from a list, and is copied to another grid, each as one step."""
     there = ["frames 2", "wait loaded", "frames 2"]
-    s.play("replay", ["wait loaded", "frames 3", 'click "Temperature ramp"', *there, *shot("on"), 'click "Temperature shape"', "frames 2", *shot("list"),
+    s.play("replay", ["wait loaded", "frames 3", *shown("Ramps", "Material/"), 'click "Temperature ramp"', *there, *shot("on"), 'click "Temperature shape"', "frames 2", *shot("list"),
                       'click "Temperature shape/Contrast"', *there, *shot("shaped"), 'click "Copy##temperature"', "frames 2",
                       'click "Flame ramp"', *there, 'click "Paste##flame"', *there, *shot("pasted"), "key ctrl+z", *there,
                       'report "undone.json"'],
@@ -270,7 +275,7 @@ def test_color_ramps(s):
     removes a stop, each as one step. The Delete key removes the selected stop and not the volume."""
     there = ["frames 2", "wait loaded", "wait converged", "frames 2"]
     bar = '"Flame colors bar"'
-    s.play("replay", [*there, *shot("plain"), 'click "Temperature colors"', *there, 'click "Palette##Temperature colors"', "frames 2",
+    s.play("replay", [*there, *shot("plain"), *shown("Ramps", "Material/"), 'click "Temperature colors"', *there, 'click "Palette##Temperature colors"', "frames 2",
                       'click "Palette##Temperature colors/Gas"', *there, 'click "Copy##Temperature colors"', "frames 2",
                       'click "Flame colors"', *there, 'report "first.json"', 'click "Paste##Flame colors"', *there, *shot("pasted"),
                       f"click {bar} 0.5 0.5 right", *there, 'report "removed.json"', f"click {bar} 0.3 0.3", "key delete", *there,

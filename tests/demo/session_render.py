@@ -40,10 +40,10 @@ def test_render(s):
     file_manager(s)
     s.play("replay",
            ["wait loaded", "wait converged", "key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/scene.json"', "key enter", "frames 3",
-            "key f12", "frames 3", *shot("dialog"), *SMALL, *choose("Denoising", "Off"), *enter("Picture file", f"{s.out}/one.png"), *shot("started"),
+            "key f12", "frames 3", *shot("dialog"), *SMALL, *choose("Denoise", "Off"), *enter("Picture file", f"{s.out}/one.png"), *shot("started"),
             "drag viewport 0.3 0.5 to viewport 0.5 0.5", "frames 3", *shot("moved"), "wait rendered", "frames 3", *shot("done"),
             'click "Render 1/Show in folder"', "frames 3",
-            "key f12", "frames 3", *choose("Format", "EXR"), 'click "Layer/normal"', "frames 2", *choose("Denoising", "Fast"),
+            "key f12", "frames 3", *choose("Format", "EXR"), 'click "Layer/normal"', "frames 2", *choose("Denoise", "Fast"),
             *enter("Picture file", f"{s.out}/two.exr"), "wait rendered", "frames 3",
             "key f12", "frames 3", *choose("Format", "WebP"), *enter("Picture file", f"{s.out}/three"), "wait rendered", "frames 3",
             # A picture that takes long is canceled, and a wrong path is refused.

@@ -10,6 +10,7 @@
 #include <limits>
 #include <numbers>
 
+#include "../../demo/app/kelvin.hpp"
 #include "base/luminance.hpp"
 
 namespace {
@@ -108,6 +109,26 @@ TEST(BlackBody, InvalidTemperaturesEmitNothing) {
   EXPECT_EQ(table.emission(1500.0F, 0.0F), glm::vec3(0.0F));
   const glm::vec3 hot = table.emission(1.0e6F, 1.0F);
   EXPECT_TRUE(std::isfinite(hot.r) && hot.b > hot.r);
+}
+
+// The demo has a table, because programs see the public headers only.
+TEST(BlackBody, ColorsOfLightsInTheDemoAgree) {
+  using namespace cumulet::demo;
+  for (double kelvin = min_kelvin; kelvin <= max_kelvin; kelvin *= 1.0173) {
+    const Rgb shown = color_of_kelvin(kelvin);
+    const glm::dvec3 exact = black_body_color(kelvin);
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(static_cast<double>(shown[static_cast<std::size_t>(i)]), exact[i], 0.003) << kelvin << " K";
+    const auto found = nearest_kelvin({3.0F * shown[0], 3.0F * shown[1], 3.0F * shown[2]});
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->kelvin, kelvin, 0.002 * kelvin);
+    EXPECT_LT(found->distance, 1e-4F);
+  }
+  const auto white = nearest_kelvin({1.0F, 1.0F, 1.0F});
+  ASSERT_TRUE(white);
+  EXPECT_NEAR(white->kelvin, 6500.0, 200.0);
+  EXPECT_GT(white->distance, 5e-3F) << "daylight is no black body";
+  EXPECT_FALSE(nearest_kelvin({0.0F, 0.0F, 0.0F}));
 }
 
 }  // namespace
