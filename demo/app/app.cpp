@@ -334,7 +334,10 @@ void App::accept(const Answer& answer) {
   if (answer.edits.environment == sent.edits.environment)
     model_.scene.environment = sent.scene.environment = answer.environment;
   if (!exchange_.waiting() && !loading_.environment.empty()) {
-    if (model_.scene.environment == loading_.environment) take_daylight(model_.scene);
+    if (model_.scene.environment == loading_.environment) {
+      take_daylight(model_.scene);
+      show_default_ground(model_, false);  // the map has its own
+    }
     loading_.environment.clear();
   }
   if (model_.status.compiled && !answer.status.compiled) model_.charts.compiled_percent.add(100.0f);

@@ -85,6 +85,7 @@ struct App::Commands {
        [](App& app, const Command&) {
          app.model_.scene.environment.clear();
          give_daylight(app.model_.scene);
+         show_default_ground(app.model_, true);
        }},
       {Action::ocio_dialog,
        [](App& app, const Command&) { app.open_dialog("Open OpenColorIO configuration", Action::open_ocio, {".ocio"}); }},

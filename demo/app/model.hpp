@@ -304,8 +304,10 @@ struct Model {
   Model();
 };
 
-/// Opens the surfaces of a file. They replace the previous surfaces and the default ground, because models usually have
-/// their own.
+/// Shows or hides the ground below the scene, unless the user or a scene file has chosen one.
+void show_default_ground(Model& model, bool shows);
+
+/// Opens the surfaces of a file, which replace the previous ones.
 void open_surfaces(Model& model, const std::string& path);
 
 /// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear

@@ -31,7 +31,6 @@ void finish_ocio_options(const CLI::App& app, OcioView& view);
 struct NamedFiles {
   bool scene = false;  ///< a scene file, which sets the light
   bool model = false;
-  bool ground_below_models = false;
 };
 /// Completes the scene after the parse: sets daylight unless a flag or file sets the light, and checks flags that
 /// exclude each other. Throws UsageError.
