@@ -24,7 +24,7 @@
 #include <thread>
 #include <utility>
 
-#include "fire.hpp"
+#include "default_medium.hpp"
 #include "renderer.hpp"
 #include "thumbnail_texture.hpp"
 
@@ -253,8 +253,8 @@ bool App::is_unsaid() const {
   cumulet_medium_desc medium = model_.scene.medium;
   if (demo::is_unsaid(medium)) return true;
   if (!derived_.look) return false;
-  medium.density_scale = derived_.look->density_scale;
-  return settings::same(medium, *derived_.look);
+  medium.density_scale = derived_.look->medium.density_scale;
+  return settings::same(medium, derived_.look->medium);
 }
 
 void App::complain(const std::string& cause) {
@@ -369,13 +369,17 @@ void App::accept(const Answer& answer) {
   if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }
 
-bool App::burns() const { return derived_.look && !demo::is_unsaid(*derived_.look); }
+bool App::burns() const { return derived_.look && derived_.look->content == Content::fire; }
 
-void App::take_look(const cumulet_medium_desc& look) {
+void App::take_look(const DefaultMedium& look) {
   // Another grid of a fire keeps the light that the user chose for the first one.
   const bool burned = burns();
+  const bool smoked = derived_.look && derived_.look->content == Content::smoke;
   derived_.look = look;
-  model_.scene.medium = look;
+  model_.scene.medium = look.medium;
+  if (look.content == Content::smoke && !smoked)
+    show_message(model_, false, "The volume is smoke: gray, as in Blender", now_,
+                 MessageButton{"White", "Makes it white, as a cloud. Ctrl+Z undoes that.", {Action::white}});
   if (!burns()) give_day(model_.scene, derived_.exposure);
   if (burns() && !burned && take_dusk(model_.scene, derived_.exposure))
     show_message(

@@ -290,6 +290,11 @@ struct App::Commands {
        [](App& app, const Command&) {
          if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_when_loaded();
        }},
+      {Action::white,
+       [](App& app, const Command&) {
+         std::ranges::fill(app.model_.scene.medium.coalbedo, 0.0f);
+         app.model_.scene.albedo_given = true;
+       }},
       {Action::keep_place,
        [](App& app, const Command& command) {
          const Item item{command.text == "model" ? Item::Kind::model : Item::Kind::volume,
@@ -361,6 +366,7 @@ void App::open(const std::string& path) {
     const UpAxis up = known_up_axis(path);
     set_volume(model_.scene, {.volume = path, .up = up});
     model_.scene.clip = {};  // it is in the space of the volume before
+    if (!loading_.starting) model_.scene.albedo_given = false;
     if (up == UpAxis::z) show_up_axis(path, "");
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();

@@ -65,6 +65,7 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
       suggests = ui_.button("Auto density", "Sets the density scale to a mean optical depth of 8.", {-1.0f, 0.0f});
     if (setting.is(&Desc::coalbedo)) absorption(medium.coalbedo);
   });
+  volume.albedo_given |= !std::ranges::equal(medium.coalbedo, before.coalbedo);
   if (first) {
     volume.medium = medium;
     if (suggests) commands.push_back({Action::auto_density});

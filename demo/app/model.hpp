@@ -101,6 +101,7 @@ enum class Action {
   quit_anyway,   // asks only about unsaved changes
   follow_light,  // measures the exposure again, because the sun has moved
   daylight,      // sets the default daylight and display instead of the dusk of a burning volume
+  white,         // sets the albedo 1 instead of the gray of smoke
   keep_place     // text: "volume" or "model", value: its index; removes the transform that the program gave it
 };
 

@@ -247,7 +247,11 @@ void add_medium_options(CLI::App& app, const char* group, SceneOptions& scene) {
         apply(static_cast<Preset>(found->value), scene.medium);
       },
       "Medium preset; does not set the density scale; other flags override its settings");
-  add_settings(app, group, scene.medium, take_auto);
+  const auto take_special = [take_auto, &scene](std::string_view flag, const std::string& text) {
+    if (flag == "--albedo") scene.albedo_given = true;
+    return take_auto(flag, text);
+  };
+  add_settings(app, group, scene.medium, take_special);
   for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
     add(
         app, group, settings::ramps[i].flag, "X:Y,X:Y,...|none",
