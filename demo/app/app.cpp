@@ -80,6 +80,9 @@ App::App(DemoOptions options)
   if (options_.open.empty() && options_.scene_file.empty()) suggest_up_axis();
   changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds, model_.scene);
   if (!options_.open.empty()) open(options_.open);
+  loading_.fit_all = needs_fit(model_.scene.camera) && model_.scene.surface_camera < 0;
+  loading_.surfaces = model_.scene_path.empty() && !model_.scene.surfaces.empty();
+  loading_.remark |= !model_.scene_path.empty() && loading_.fit_all;
   history_.emplace(model_.scene);
   choose_dialogs();
   offer_recovery();

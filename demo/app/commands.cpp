@@ -360,6 +360,7 @@ void App::open(const std::string& path) {
   const bool keeps = model_.modified || !model_.scene_path.empty();
   if (is_model(path)) {
     open_surfaces(model_, path);
+    loading_.surfaces = loading_.remark = true;
   } else if (is_environment(path)) {
     model_.scene.environment = loading_.environment = path;
   } else {
@@ -373,7 +374,8 @@ void App::open(const std::string& path) {
     model_.scene.sequence.frame.reset();
     model_.scene.visible = true;
     deselect(model_);
-    loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
+    loading_.fit = loading_.suggest = loading_.pick = loading_.reload = loading_.remark = true;
+    loading_.surfaces = !model_.scene.surfaces.empty();
   }
   meter_when_loaded();
   // A file that is only viewed needs no saving.

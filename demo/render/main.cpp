@@ -48,6 +48,7 @@
 #include "settled.hpp"
 #include "stats.hpp"
 #include "time_limit.hpp"
+#include "tiny_objects.hpp"
 #include "transforms.hpp"
 #include "up_axis.hpp"
 
@@ -58,6 +59,7 @@ using cumulet::demo::Checkpoint;
 using cumulet::demo::driver_of;
 using cumulet::demo::EarlyPictures;
 using cumulet::demo::FireLook;
+using cumulet::demo::fits;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
 using cumulet::demo::one_line;
@@ -347,6 +349,9 @@ class Studio {
       cumulet::demo::print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
     if (look_) cumulet::demo::print_medium(*look_, progress_);
     fire_look_.print_light(progress_);
+    if (!fits(scene.camera) || scene.surface_camera >= 0) return;
+    const auto boxes = cumulet::demo::placed_boxes(viewer_.get(), scene, others_, models_);
+    for (const std::string& line : cumulet::demo::remarks_on_tiny(boxes)) print_line(progress_, line);
   }
 
   /// Applies the settings that need the loaded surfaces: material variant and camera.
@@ -607,8 +612,6 @@ EarlyPictures early_pictures(const RenderOptions& options) {
   const bool alone = options.checkpoint.empty() && options.stats.empty() && options.trace.empty();
   return EarlyPictures(options.format == OutputFormat::png && alone ? std::optional(first_seconds) : std::nullopt);
 }
-
-bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
 
 /// Places the camera if the scene has none.
 void place_camera(const Viewer& viewer, const RenderOptions& options) {

@@ -193,6 +193,19 @@ TEST_F(ExtremeFiles, SmokeOfASceneKeepsTheSceneAlbedo) {
   EXPECT_LT(scene("heated.vdb", "cloud.vdb", "").mean(), 0.98 * white.mean()) << "the first volume is gray";
 }
 
+TEST_F(ExtremeFiles, ObjectsTooSmallToBeSeenAreNamed) {
+  write("cloud.vdb", {smoke()});
+  const auto said = [&](const std::string& second, const std::string& more) {
+    std::ofstream(path("scene.json")) << R"({"cumulet_scene": 3, "volumes": [{"file": "cloud.vdb"}, )"
+                                      << R"({"file": "cloud.vdb", "name": "the second", )" << second << "}]}";
+    return command("cloud.vdb", path("picture.pfm"), "--scene '" + path("scene.json") + "' " + more).said;
+  };
+  const std::string tiny = R"("scale": [0.005, 0.005, 0.005])";
+  EXPECT_NE(said(tiny, "").find("the second is 20"), std::string::npos);
+  EXPECT_EQ(said(R"("scale": [0.05, 0.05, 0.05])", "").find("times smaller"), std::string::npos);
+  EXPECT_EQ(said(tiny, "--camera '0,0,60 0,0,0 40'").find("times smaller"), std::string::npos) << "a chosen view";
+}
+
 // When a fire goes out, its last frames have only a few kelvin.
 TEST_F(ExtremeFiles, SequenceFramesShareOneScale) {
   write("fire.0001.vdb", {smoke(), heat(2250.0F)});
