@@ -24,7 +24,7 @@
 #include <thread>
 #include <utility>
 
-#include "fire.hpp"
+#include "default_medium.hpp"
 #include "renderer.hpp"
 #include "thumbnail_texture.hpp"
 
@@ -81,6 +81,9 @@ App::App(DemoOptions options)
   if (options_.open.empty() && options_.scene_file.empty()) suggest_up_axis();
   changes_.emplace(recovery_folder(), model_.preferences.autosave_seconds, model_.scene);
   if (!options_.open.empty()) open(options_.open);
+  loading_.fit_all = needs_fit(model_.scene.camera) && model_.scene.surface_camera < 0;
+  loading_.surfaces = model_.scene_path.empty() && !model_.scene.surfaces.empty();
+  loading_.remark |= !model_.scene_path.empty() && loading_.fit_all;
   history_.emplace(model_.scene);
   choose_dialogs();
   offer_recovery();
@@ -254,8 +257,8 @@ bool App::is_unsaid() const {
   cumulet_medium_desc medium = model_.scene.medium;
   if (demo::is_unsaid(medium)) return true;
   if (!derived_.look) return false;
-  medium.density_scale = derived_.look->density_scale;
-  return settings::same(medium, *derived_.look);
+  medium.density_scale = derived_.look->medium.density_scale;
+  return settings::same(medium, derived_.look->medium);
 }
 
 void App::complain(const std::string& cause) {
@@ -335,7 +338,10 @@ void App::accept(const Answer& answer) {
   if (answer.edits.environment == sent.edits.environment)
     model_.scene.environment = sent.scene.environment = answer.environment;
   if (!exchange_.waiting() && !loading_.environment.empty()) {
-    if (model_.scene.environment == loading_.environment) take_daylight(model_.scene);
+    if (model_.scene.environment == loading_.environment) {
+      take_daylight(model_.scene);
+      show_default_ground(model_, false);  // the map has its own
+    }
     loading_.environment.clear();
   }
   if (model_.status.compiled && !answer.status.compiled) model_.charts.compiled_percent.add(100.0f);
@@ -367,13 +373,17 @@ void App::accept(const Answer& answer) {
   if (!exchange_.waiting() && std::exchange(loading_.meter, false)) request({Request::Type::meter_exposure});
 }
 
-bool App::burns() const { return derived_.look && !demo::is_unsaid(*derived_.look); }
+bool App::burns() const { return derived_.look && derived_.look->content == Content::fire; }
 
-void App::take_look(const cumulet_medium_desc& look) {
+void App::take_look(const DefaultMedium& look) {
   // Another grid of a fire keeps the light that the user chose for the first one.
   const bool burned = burns();
+  const bool smoked = derived_.look && derived_.look->content == Content::smoke;
   derived_.look = look;
-  model_.scene.medium = look;
+  model_.scene.medium = look.medium;
+  if (look.content == Content::smoke && !smoked)
+    show_message(model_, false, "The volume is smoke: gray, as in Blender", now_,
+                 MessageButton{"White", "Makes it white, as a cloud. Ctrl+Z undoes that.", {Action::white}});
   if (!burns()) give_day(model_.scene, derived_.exposure);
   if (burns() && !burned && take_dusk(model_.scene, derived_.exposure))
     show_message(

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <default_medium.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -122,7 +123,7 @@ class App {
   /// Whether the volume has the default medium of a fire, so that its flames are displayed.
   [[nodiscard]] bool burns() const;
   /// Sets the default medium of a volume, and dusk light if it burns.
-  void take_look(const cumulet_medium_desc& look);
+  void take_look(const DefaultMedium& look);
   /// Returns true if the medium was set neither by the user nor by a flag or scene file.
   [[nodiscard]] bool is_unsaid() const;
   /// Measures the exposure when everything is loaded, unless the user has disabled that.
@@ -153,6 +154,9 @@ class App {
     bool pick = false;        // the volume being loaded was opened without a grid name
     bool starting = true;     // until the files of the command line are loaded or have failed
     bool discards = false;    // the user continues without the unsaved changes
+    bool surfaces = false;    // surfaces were opened beside other objects and are not placed yet
+    bool fit_all = false;     // the command line gives no camera
+    bool remark = false;      // remark on objects that are hard to see, when everything is loaded
     std::vector<Item> added;  // objects that were added and are not placed yet
     std::string scene;        // scene file
     std::string environment;  // environment map
@@ -213,10 +217,10 @@ class App {
   double last_motion_ = -1.0;
   /// Settings that were derived from the scene. They stay if the user changes them.
   struct Derived {
-    std::optional<cumulet_medium_desc> look;  // default medium of the volume
-    std::optional<float> exposure;            // stops
-    bool exposure_given = false;              // a flag or a scene file has set the exposure
-    bool exposure_asked = false;              // the user has requested the measurement
+    std::optional<DefaultMedium> look;  // of the volume
+    std::optional<float> exposure;      // stops
+    bool exposure_given = false;        // a flag or a scene file has set the exposure
+    bool exposure_asked = false;        // the user has requested the measurement
   } derived_;
 };
 

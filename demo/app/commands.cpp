@@ -88,6 +88,7 @@ struct App::Commands {
        [](App& app, const Command&) {
          app.model_.scene.environment.clear();
          give_daylight(app.model_.scene);
+         show_default_ground(app.model_, true);
        }},
       {Action::ocio_dialog,
        [](App& app, const Command&) { app.open_dialog("Open OpenColorIO configuration", Action::open_ocio, {".ocio"}); }},
@@ -293,6 +294,11 @@ struct App::Commands {
        [](App& app, const Command&) {
          if (give_day(app.model_.scene, app.derived_.exposure)) app.meter_when_loaded();
        }},
+      {Action::white,
+       [](App& app, const Command&) {
+         std::ranges::fill(app.model_.scene.medium.coalbedo, 0.0f);
+         app.model_.scene.albedo_given = true;
+       }},
       {Action::keep_place,
        [](App& app, const Command& command) {
          const Item item{command.text == "model" ? Item::Kind::model : Item::Kind::volume,
@@ -364,12 +370,14 @@ void App::open(const std::string& path) {
   const bool keeps = model_.modified || !model_.scene_path.empty();
   if (is_model(path)) {
     open_surfaces(model_, path);
+    loading_.surfaces = loading_.remark = true;
   } else if (is_environment(path)) {
     model_.scene.environment = loading_.environment = path;
   } else {
     const UpAxis up = known_up_axis(path);
     set_volume(model_.scene, {.volume = path, .up = up});
     model_.scene.clip = {};  // it is in the space of the volume before
+    if (!loading_.starting) model_.scene.albedo_given = false;
     if (up == UpAxis::z) show_up_axis(path, "");
     model_.scene.sequence.first.reset();
     model_.scene.sequence.last.reset();
@@ -377,7 +385,8 @@ void App::open(const std::string& path) {
     model_.scene.sequence.playback.repeat = CUMULET_REPEAT_LOOP;
     model_.scene.visible = true;
     deselect(model_);
-    loading_.fit = loading_.suggest = loading_.pick = loading_.reload = true;
+    loading_.fit = loading_.suggest = loading_.pick = loading_.reload = loading_.remark = true;
+    loading_.surfaces = !model_.scene.surfaces.empty();
   }
   meter_when_loaded();
   // A file that is only viewed needs no saving.

@@ -70,6 +70,7 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
       if (first) row(&Desc::max_bounces);
       if (is_hot) row(&Desc::temperature_offset);
     });
+  volume.albedo_given |= !std::ranges::equal(medium.coalbedo, before.coalbedo);
   if (first) {
     volume.medium = medium;
     if (suggests) commands.push_back({Action::auto_density});

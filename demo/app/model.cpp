@@ -181,8 +181,14 @@ void open_surfaces(Model& model, const std::string& path) {
   model.scene.surface.struct_size = sizeof model.scene.surface;
   model.scene.surface_variant.clear();
   model.scene.surface_camera = -1;
-  if (std::exchange(model.unchosen_ground, false) && model.scene.ground.mode == CUMULET_GROUND_BELOW)
-    model.scene.ground.mode = CUMULET_GROUND_NONE;
+  // A model that is cut out for compositing needs no ground.
+  if (model.scene.display.background != CUMULET_BACKGROUND_SKY) show_default_ground(model, false);
+}
+
+void show_default_ground(Model& model, bool shows) {
+  auto& mode = model.scene.ground.mode;
+  if (model.unchosen_ground && mode != CUMULET_GROUND_AT_HEIGHT)
+    mode = shows ? CUMULET_GROUND_BELOW : CUMULET_GROUND_NONE;
 }
 
 std::span<const std::string> listed_files(const Preferences& preferences) {

@@ -101,6 +101,7 @@ enum class Action {
   quit_anyway,   // asks only about unsaved changes
   follow_light,  // measures the exposure again, because the sun has moved
   daylight,      // sets the default daylight and display instead of the dusk of a burning volume
+  white,         // sets the albedo 1 instead of the gray of smoke
   keep_place,    // text: "volume" or "model", value: its index; removes the transform that the program gave it
   go_to_end,     // value: -1 for the first played frame, 1 for the last one
   about          // shows the version, the OpenGL driver and the libraries
@@ -306,8 +307,10 @@ struct Model {
   Model();
 };
 
-/// Opens the surfaces of a file. They replace the previous surfaces and the default ground, because models usually have
-/// their own.
+/// Shows or hides the ground below the scene, unless the user or a scene file has chosen one.
+void show_default_ground(Model& model, bool shows);
+
+/// Opens the surfaces of a file, which replace the previous ones.
 void open_surfaces(Model& model, const std::string& path);
 
 /// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear

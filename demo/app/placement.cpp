@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <glm/gtc/matrix_transform.hpp>
 #include <string>
+#include <tiny_objects.hpp>
 #include <utility>
+#include <vector>
 
 #include "app.hpp"
 #include "selection.hpp"
@@ -42,22 +44,35 @@ void add(std::optional<Box>& all, const Box& box, const glm::dmat4& transform) {
   }
 }
 
-}  // namespace
+bool is_visible(const SceneOptions& scene, const Item& item) {
+  return item.kind == Item::Kind::model ? scene.models[item.index].visible : volume_at(scene, item.index).is_shown();
+}
 
-std::optional<Box> box_of_others(const Model& model, const Item& item) {
+std::optional<Box> box_of_surfaces(const Model& model) {
+  const cumulet_surfaces_info& surfaces = model.status.surfaces;
+  if (model.scene.surfaces.empty() || surfaces.triangles == 0) return std::nullopt;
+  const auto& low = surfaces.bounds_min;
+  const auto& high = surfaces.bounds_max;
+  return Box{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+}
+
+/// Returns the box of all objects except one and the surfaces.
+std::optional<Box> box_of_items(const Model& model, const std::optional<Item>& except) {
   std::optional<Box> all;
   for (const Item& other : items_of(model.scene)) {
-    if (other == item || other.kind == Item::Kind::analytic_light) continue;
+    if (other == except || other.kind == Item::Kind::analytic_light) continue;
     const auto box = box_of(model.scene, model.status.boxes, other);
     const auto transform = transform_of(model.scene, other);
     if (box && transform) add(all, *box, *transform);
   }
-  const cumulet_surfaces_info& surfaces = model.status.surfaces;
-  if (!model.scene.surfaces.empty() && surfaces.triangles > 0) {
-    const auto& low = surfaces.bounds_min;
-    const auto& high = surfaces.bounds_max;
-    add(all, {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}}, glm::dmat4(1.0));
-  }
+  return all;
+}
+
+}  // namespace
+
+std::optional<Box> box_of_others(const Model& model, const Item& item) {
+  std::optional<Box> all = box_of_items(model, item);
+  if (const auto surfaces = box_of_surfaces(model)) add(all, *surfaces, glm::dmat4(1.0));
   return all;
 }
 
@@ -90,6 +105,67 @@ std::optional<Placement> place_in(const Box& scene, const Box& object, const dve
   return placement;
 }
 
+void place(Model& model, const Item& item, const Box& box, const Box& others, double now) {
+  const auto& eye = model.scene.camera.eye;
+  const auto placement = place_in(others, box, {eye[0], eye[1], eye[2]});
+  if (!placement) return;
+  set_transform(model.scene, item, placement->transform);
+  const double ratio = size_of(box) / size_of(others);
+  std::array<char, 96> text{};
+  if (placement->scale == 1.0)
+    std::snprintf(text.data(), text.size(), " is far from the scene: moved into view");
+  else if (ratio < 1.0)
+    std::snprintf(text.data(), text.size(), " is %.0f times smaller than the scene: scaled by %g", 1.0 / ratio,
+                  placement->scale);
+  else
+    std::snprintf(text.data(), text.size(), " is %.0f times larger than the scene: scaled by %g", ratio,
+                  placement->scale);
+  const bool is_model = item.kind == Item::Kind::model;
+  show_message(model, false, row_text(model.scene, item) + text.data(), now,
+               MessageButton{"Own place",
+                             "Restores the size and the place of the file.",
+                             {Action::keep_place, is_model ? "model" : "volume", static_cast<int>(item.index)}});
+}
+
+bool place_surfaces(Model& model, double now) {
+  SceneOptions& scene = model.scene;
+  const auto box = box_of_surfaces(model);
+  const auto others = box_of_items(model, std::nullopt);
+  const auto& eye = scene.camera.eye;
+  if (!box || !others || !place_in(*others, *box, {eye[0], eye[1], eye[2]})) return false;
+  scene.models.push_back({.file = std::exchange(scene.surfaces, ""),
+                          .time = scene.surface.time,
+                          .animation = scene.surface.animation,
+                          .variant = std::exchange(scene.surface_variant, ""),
+                          .double_sided = scene.surface.double_sided != 0});
+  place(model, {Item::Kind::model, scene.models.size() - 1, 0}, *box, *others, now);
+  return true;
+}
+
+bool remark_on_tiny(Model& model, double now) {
+  const SceneOptions& scene = model.scene;
+  std::vector<PlacedBox> boxes;
+  const auto add_box = [&](const std::string& name, const Box& box, const glm::dmat4& transform) {
+    std::optional<Box> moved;
+    add(moved, box, transform);
+    boxes.push_back(
+        {name, {moved->least.x, moved->least.y, moved->least.z}, {moved->most.x, moved->most.y, moved->most.z}});
+  };
+  for (const Item& item : items_of(scene)) {
+    if (item.kind == Item::Kind::analytic_light || !is_visible(scene, item)) continue;
+    const auto box = box_of(scene, model.status.boxes, item);
+    if (!box) return false;
+    add_box(row_text(scene, item), *box, transform_of(scene, item).value_or(glm::dmat4(1.0)));
+  }
+  if (!scene.surfaces.empty()) {
+    const auto box = box_of_surfaces(model);
+    if (!box) return false;
+    add_box(std::filesystem::path(scene.surfaces).filename().string(), *box, glm::dmat4(1.0));
+  }
+  for (const std::string& remark : remarks_on_tiny(boxes)) show_message(model, false, remark, now);
+  return true;
+}
+
 void App::take_added(const Item& item) {
   select(model_, item);
   loading_.added.push_back(item);
@@ -115,6 +191,9 @@ void App::drop_failed(const std::string& file) {
 }
 
 void App::place_added() {
+  // The program has placed the camera by the file's own place.
+  if (std::exchange(loading_.surfaces, false) && place_surfaces(model_, now_) && loading_.starting && loading_.fit_all)
+    request({Request::Type::frame_all});
   for (const Item& item : std::exchange(loading_.added, {})) {
     if (!transform_of(model_.scene, item)) continue;
     const auto box = box_of(model_.scene, model_.status.boxes, item);
@@ -122,28 +201,9 @@ void App::place_added() {
       loading_.added.push_back(item);
       continue;
     }
-    const auto others = box_of_others(model_, item);
-    if (!others) continue;
-    const auto& eye = model_.scene.camera.eye;
-    const auto placement = place_in(*others, *box, {eye[0], eye[1], eye[2]});
-    if (!placement) continue;
-    set_transform(model_.scene, item, placement->transform);
-    const double ratio = size_of(*box) / size_of(*others);
-    std::array<char, 96> text{};
-    if (placement->scale == 1.0)
-      std::snprintf(text.data(), text.size(), " is far from the scene: moved into view");
-    else if (ratio < 1.0)
-      std::snprintf(text.data(), text.size(), " is %.0f times smaller than the scene: scaled by %g", 1.0 / ratio,
-                    placement->scale);
-    else
-      std::snprintf(text.data(), text.size(), " is %.0f times larger than the scene: scaled by %g", ratio,
-                    placement->scale);
-    const bool is_model = item.kind == Item::Kind::model;
-    show_message(model_, false, row_text(model_.scene, item) + text.data(), now_,
-                 MessageButton{"Own place",
-                               "Restores the size and the place of the file.",
-                               {Action::keep_place, is_model ? "model" : "volume", static_cast<int>(item.index)}});
+    if (const auto others = box_of_others(model_, item)) place(model_, item, *box, *others, now_);
   }
+  if (loading_.remark && remark_on_tiny(model_, now_)) loading_.remark = false;
 }
 
 }  // namespace cumulet::demo

@@ -20,4 +20,13 @@ struct Placement {
 /// the same ground. nullopt if the object's own place is suitable: it is neither tiny nor huge nor far away.
 [[nodiscard]] std::optional<Placement> place_in(const Box& scene, const Box& object, const glm::dvec3& eye);
 
+/// Gives an object that was just added its place beside the others, if its own is unsuitable, and shows a message.
+/// box: of the object, without the transform of the scene. now: seconds, of the message, here and below.
+void place(Model& model, const Item& item, const Box& box, const Box& others, double now);
+/// Does so with the scene's surfaces, which become a model, because surfaces have no transform. Returns true if it did.
+bool place_surfaces(Model& model, double now);
+/// Shows a message for each object that a view of the whole scene hardly shows. Returns false if the box of an object
+/// is not known yet.
+bool remark_on_tiny(Model& model, double now);
+
 }  // namespace cumulet::demo

@@ -8,10 +8,17 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
+#include <frame_row.hpp>
+#include <functional>
 #include <program.hpp>
+#include <scene_file.hpp>
+#include <set>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -25,6 +32,43 @@ namespace fs = std::filesystem;
 
 constexpr int low_priority = 10;       // the user's work comes first
 constexpr const char* part = ".part";  // ending of an unfinished thumbnail, behind the number of its process
+constexpr std::size_t max_kept = 64;  // thumbnails that are kept for files that are not listed
+
+/// Returns a text that changes with the file's content; "" if it does not exist.
+std::string state_of(const std::string& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return "";
+  return file + '\n' + std::to_string(status.st_mtim.tv_sec) + '.' + std::to_string(status.st_mtim.tv_nsec) + '\n' +
+         std::to_string(status.st_size);
+}
+
+void add_volume(std::vector<std::string>& files, const std::string& volume) {
+  const auto row = FrameRow::of_name(volume);
+  if (!row) return files.push_back(volume);
+  const std::vector<std::string> frames = row->files();
+  files.insert(files.end(), frames.begin(), frames.end());
+}
+
+/// Returns the files that a scene file refers to; those before an error if it cannot be read.
+std::vector<std::string> files_of_scene(const std::string& path) {
+  std::vector<std::string> files;
+  try {
+    const SceneOptions scene = load_scene(path);
+    files = {scene.surfaces, scene.environment, scene.ocio.config};
+    for (const SceneModel& model : scene.models) files.push_back(model.file);
+    add_volume(files, scene.volume);
+    for (const SceneVolume& other : scene.others) add_volume(files, other.volume);
+  } catch (const std::exception&) {  // the program reports that
+  }
+  std::erase(files, "");
+  return files;
+}
+
+bool is_thumbnail(const fs::path& path) {
+  constexpr std::string_view digits = "0123456789abcdef";
+  const std::string stem = path.stem().string();
+  return path.extension() == ".png" && stem.size() == 16 && stem.find_first_not_of(digits) == std::string::npos;
+}
 
 }  // namespace
 
@@ -42,10 +86,13 @@ void RecentThumbnails::stop() {
 }
 
 std::string RecentThumbnails::path_for(const std::string& file) const {
-  struct stat status {};
-  if (is_environment(file) || ::stat(file.c_str(), &status) != 0) return "";
-  const std::string version = file + '\n' + std::to_string(status.st_mtim.tv_sec) + '.' +
-                              std::to_string(status.st_mtim.tv_nsec) + '\n' + std::to_string(status.st_size);
+  std::string version = state_of(file);
+  if (is_environment(file) || version.empty()) return "";
+  if (has_ending(file, ".json")) {
+    Scene& scene = scenes_[file];
+    if (scene.state != version) scene = {version, files_of_scene(file)};
+    for (const std::string& used : scene.files) version += '\n' + state_of(used);
+  }
   std::array<char, 24> name{};
   std::snprintf(name.data(), name.size(), "%016llx.png", static_cast<unsigned long long>(fnv1a(version)));
   return (fs::path(folder_) / name.data()).string();
@@ -66,7 +113,10 @@ bool RecentThumbnails::follow(std::span<const std::string> files, double now) {
   if (!worked && now < next_look_ && std::ranges::equal(files, followed_)) return false;
   followed_.assign(files.begin(), files.end());
   next_look_ = now + pause;
-  if (!std::exchange(removed_left_, true)) remove_left();
+  if (!std::exchange(removed_left_, true)) {
+    remove_left();
+    remove_old();
+  }
   for (const std::string& file : files) {
     const std::string picture = path_for(file);
     std::error_code error;
@@ -90,7 +140,20 @@ bool RecentThumbnails::finish() {
     fs::remove(making_->unfinished, error);
   }
   making_.reset();
+  remove_old();
   return true;
+}
+
+void RecentThumbnails::remove_old() const {
+  std::set<std::string> listed;
+  for (const std::string& file : followed_) listed.insert(path_for(file));
+  std::vector<std::pair<fs::file_time_type, fs::path>> others;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
+    if (is_thumbnail(entry.path()) && !listed.contains(entry.path().string()))
+      others.emplace_back(entry.last_write_time(error), entry.path());
+  std::ranges::sort(others, std::greater());
+  for (std::size_t i = max_kept; i < others.size(); ++i) fs::remove(others[i].second, error);
 }
 
 void RecentThumbnails::remove_left() const {

@@ -12,7 +12,8 @@
 namespace cumulet::demo {
 
 /// Thumbnails of recent files. `cumulet-render --thumbnail` makes the missing ones in the background, one after
-/// another, and they are kept in a folder until their files change. All calls from one thread.
+/// another, and they are kept in a folder until their files change; those of a scene also until the files that it uses
+/// change. Of files that are not listed, the newest ones are kept. All calls from one thread.
 class RecentThumbnails {
  public:
   static constexpr int side = 256;  // pixels
@@ -45,16 +46,25 @@ class RecentThumbnails {
   void begin(const std::string& file, const std::string& picture);
   // Takes the thumbnail of a program that has ended. Returns false if the program still runs.
   bool finish();
+  // Removes the oldest thumbnails of files that are not listed.
+  void remove_old() const;
   // Removes the unfinished thumbnails that killed programs have left.
   void remove_left() const;
+
+  /// The files that a scene file in this state refers to.
+  struct Scene {
+    std::string state;
+    std::vector<std::string> files;
+  };
 
   std::string program_;
   std::string folder_;
   std::optional<Making> making_;
-  std::vector<std::string> followed_;          // files of the last look
-  double next_look_ = 0.0;                     // in seconds
-  bool removed_left_ = false;                  // unfinished thumbnails of ended programs were removed
-  std::map<std::string, std::string> failed_;  // file and the path of the thumbnail that could not be made
+  std::vector<std::string> followed_;            // files of the last look
+  double next_look_ = 0.0;                       // in seconds
+  bool removed_left_ = false;                    // unfinished thumbnails of ended programs were removed
+  mutable std::map<std::string, Scene> scenes_;  // by the name of the scene file; a cache
+  std::map<std::string, std::string> failed_;    // file and the path of the thumbnail that could not be made
 };
 
 /// Returns the path of cumulet-render, in the folder of this program; "" if it is not there.

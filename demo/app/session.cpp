@@ -15,7 +15,7 @@
 #include <tuple>
 #include <utility>
 
-#include "fire.hpp"
+#include "default_medium.hpp"
 #include "history.hpp"
 #include "ocio_text.hpp"
 #include "saved_picture.hpp"
@@ -30,7 +30,7 @@ constexpr double patience = 1.0;  // seconds to wait for the volume before surfa
 bool same_volume(const SceneVolume& a, const SceneVolume& b) {
   const auto rest = [](const SceneVolume& volume) {
     return std::tie(volume.name, volume.visible, volume.transforms, volume.shutter, volume.ramps, volume.color_ramps,
-                    volume.clip, volume.auto_density_scale, volume.sequence);
+                    volume.clip, volume.auto_density_scale, volume.albedo_given, volume.sequence);
   };
   return volume_of(a) == volume_of(b) && rest(a) == rest(b) && same(a.medium, b.medium);
 }
@@ -456,11 +456,13 @@ void Session::suggest_look() {
   suggest_density();
   const VolumePtr volume = shown();
   if (!volume || !desired_.unsaid) return;
-  cumulet_medium_desc look = SceneOptions().medium;
-  look.density_scale = known_->medium.density_scale;
-  look = medium_of_fire(volume.get(), look).value_or(look);
-  settings::spell_out_zeros(look);
-  events_.look = known_->medium = scene_.medium = look;
+  SceneVolume plain;
+  static_cast<VolumeFile&>(plain) = volume_of(scene_);
+  plain.albedo_given = scene_.albedo_given;
+  plain.medium.density_scale = known_->medium.density_scale;
+  events_.look = default_medium(volume.get(), plain);
+  settings::spell_out_zeros(events_.look->medium);
+  known_->medium = scene_.medium = events_.look->medium;
   give_known_medium();
 }
 

@@ -3,6 +3,7 @@
 #include <cumulet/cumulet.h>
 
 #include <cstdint>
+#include <default_medium.hpp>
 #include <functional>
 #include <future>
 #include <instances.hpp>
@@ -68,7 +69,7 @@ struct DesiredState {
   Edits edits;
   bool fit = false;      // fit the camera when the volume is loaded, because no scene file sets it
   bool suggest = false;  // also compute a suggested density scale, because no scene file sets it
-  bool unsaid = false;   // the medium is not set; a burning volume gets the fire medium
+  bool unsaid = false;   // the medium is not set; the volume gets its default medium
   cumulet_navigation_desc navigation{};
   bool adaptive_resolution = true;
   bool held = false;    // the user is dragging a control or the camera; grid settings may wait for the worker thread
@@ -90,11 +91,11 @@ struct AnswerEvents {
     std::string path;
     Fate fate = Fate::opened;
   };
-  bool camera_moved = false;                // by input, turntable or camera fit
-  std::optional<double> density_scale;      // suggested density scale
-  std::optional<cumulet_medium_desc> look;  // default medium of a volume that was requested with `unsaid`
-  std::optional<Picked> picked;             // result of the last pick
-  std::optional<Metered> metered;           // requested exposure
+  bool camera_moved = false;            // by input, turntable or camera fit
+  std::optional<double> density_scale;  // suggested density scale
+  std::optional<DefaultMedium> look;    // of a volume that was requested with `unsaid`
+  std::optional<Picked> picked;         // result of the last pick
+  std::optional<Metered> metered;       // requested exposure
   std::vector<Notice> notices;
   std::vector<File> files;
 };

@@ -191,7 +191,7 @@ void Session::follow_others() {
     OtherVolume made{file, {}, {}};
     const auto see = [&made](const cumulet_volume& volume) { made.fields = fields_of(volume); };
     if (own) see(*own);
-    made.open = own ? look_into(own) : open_volume(file, on_log, shared, see);
+    made.open = own ? look_into(own, file) : open_volume(file, on_log, shared, see);
     return made;
   });
 }

@@ -24,7 +24,7 @@ void App::show(SceneOptions scene, const std::string& path) {
   model_.scene_path = path;
   deselect(model_);
   loading_.reload = true;
-  loading_.fit = needs_fit(model_.scene.camera);
+  loading_.fit = loading_.remark = needs_fit(model_.scene.camera);
   changes_->reset(model_.scene);
 }
 

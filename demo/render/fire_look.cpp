@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "aovs.hpp"
-#include "fire.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -26,12 +25,20 @@ bool is_whole(const SceneOptions& scene) {
 
 }  // namespace
 
-std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene) {
+std::optional<DefaultMedium> default_medium(const Viewer& viewer, const SceneOptions& scene) {
   if (!sets_no_medium(scene)) return std::nullopt;
-  return medium_of_fire(volume_of(viewer).get(), scene.medium);
+  const DefaultMedium made = default_medium(volume_of(viewer).get(), scene);
+  return made.content == Content::cloud ? std::nullopt : std::optional(made);
 }
 
-void print_fire(const cumulet_medium_desc& medium, Progress& progress) {
+void print_medium(const DefaultMedium& made, Progress& progress) {
+  const cumulet_medium_desc& medium = made.medium;
+  if (made.content == Content::smoke) {
+    print_line(progress,
+               "the volume is smoke: using --preset smoke, gray as in Blender (--albedo 1,1,1 makes it white; any "
+               "medium option disables this)");
+    return;
+  }
   std::array<char, 160> line{};
   std::snprintf(
       line.data(), line.size(),

@@ -3,13 +3,14 @@
 #include <optional>
 #include <vector>
 
+#include "default_medium.hpp"
 #include "options.hpp"
 #include "render_viewer.hpp"
 
 namespace cumulet::demo {
 
-/// Returns the default medium of a burning volume if the scene sets no medium; nullopt if the volume does not burn.
-[[nodiscard]] std::optional<cumulet_medium_desc> medium_of_fire(const Viewer& viewer, const SceneOptions& scene);
+/// Returns the default medium of fire or smoke if the scene sets no medium; else nullopt.
+[[nodiscard]] std::optional<DefaultMedium> default_medium(const Viewer& viewer, const SceneOptions& scene);
 
 /// Dusk light, tone map and exposure for images of a burning volume.
 class FireLook {
@@ -36,7 +37,7 @@ class FireLook {
   std::optional<SceneOptions> dusk_;  // the scene at dusk
 };
 
-/// Logs the default medium of a burning volume.
-void print_fire(const cumulet_medium_desc& medium, Progress& progress);
+/// Logs the default medium of fire or smoke.
+void print_medium(const DefaultMedium& made, Progress& progress);
 
 }  // namespace cumulet::demo

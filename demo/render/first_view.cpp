@@ -1,5 +1,6 @@
 #include "first_view.hpp"
 
+#include <algorithm>
 #include <numbers>
 
 namespace cumulet::demo {
@@ -8,6 +9,8 @@ namespace {
 constexpr double azimuth = -40.0 * std::numbers::pi / 180.0;  // from +Z towards +X; the default sun is at 65 degrees
 
 }  // namespace
+
+bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
 
 void turn_to_first_view(cumulet_viewer* viewer) {
   cumulet_camera* camera = nullptr;

@@ -3,7 +3,9 @@
 #include <cumulet/cumulet.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,6 +13,7 @@
 #include <program.hpp>
 #include <stdexcept>
 
+#include "default_medium.hpp"
 #include "library_call.hpp"
 
 namespace cumulet::demo {
@@ -89,6 +92,8 @@ Json volume_info(const std::string& path) {
     entry["metadata"] = metadata_of(inspection, static_cast<std::int32_t>(i), grid.metadata_count);
     json["grids"].push_back(entry);
   }
+  constexpr std::array names = {"cloud", "smoke", "fire"};
+  json["content"] = names.at(static_cast<std::size_t>(content_of(inspection)));
   return json;
 }
 
@@ -154,17 +159,7 @@ bool is_z_up(const std::string& volume_file) {
     if (entry["name"] == "creator" && entry["value"].get<std::string>().find("Blender") != std::string::npos)
       return true;
   }
-  // Mantaflow writes its own metadata entry into every grid. The loop ends at the index past the last entry.
-  for (std::uint32_t grid = 0; grid < file.grid_count; ++grid) {
-    cumulet_metadata entry{};
-    entry.struct_size = sizeof entry;
-    for (std::uint32_t i = 0;
-         cumulet_inspection_get_metadata(inspection.get(), static_cast<std::int32_t>(grid), i, &entry) == CUMULET_OK;
-         ++i) {
-      if (std::string(entry.name) == "file_base_resolution") return true;
-    }
-  }
-  return false;
+  return is_of_mantaflow(inspection.get());
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "fire.hpp"
+#include "default_medium.hpp"
 #include "library_call.hpp"
 
 namespace cumulet::demo {
@@ -24,14 +24,17 @@ bool same_instance(const cumulet_instance_desc& a, const cumulet_instance_desc& 
 cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open) {
   cumulet_medium_desc medium = scene.medium;
   if (!scene.auto_density_scale || medium.density_scale > 0.0) return medium;
-  if (open.fire && is_unsaid(medium)) return *open.fire;
+  const bool keeps = open.look.content == Content::smoke && scene.albedo_given;
+  if (open.look.content != Content::cloud && !keeps && is_unsaid(medium)) return open.look.medium;
   medium.density_scale = open.density_scale;
   return medium;
 }
 
-OpenVolume look_into(std::shared_ptr<cumulet_volume> volume) {
-  OpenVolume open{std::move(volume), std::nullopt, 0.0, std::nullopt};
-  open.fire = medium_of_fire(open.volume.get(), SceneVolume().medium);
+OpenVolume look_into(std::shared_ptr<cumulet_volume> volume, const VolumeFile& file) {
+  OpenVolume open{std::move(volume), std::nullopt, 0.0, {}};
+  SceneVolume plain;
+  static_cast<VolumeFile&>(plain) = file;
+  open.look = default_medium(open.volume.get(), plain);
   if (cumulet_volume_suggest_density_scale(open.volume.get(), &open.density_scale) != CUMULET_OK)
     open.density_scale = 0.0;
   return open;
@@ -64,7 +67,7 @@ OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_use
   check_call(cumulet_volume_open_file(&desc, &opened, nullptr, 0));
   const std::shared_ptr<cumulet_volume> volume(opened, cumulet_volume_release);
   if (see) see(*volume);
-  return look_into(volume);
+  return look_into(volume, file);
 }
 
 std::shared_ptr<cumulet_sequence> open_sequence(const std::vector<std::string>& files,

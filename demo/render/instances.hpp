@@ -11,19 +11,21 @@
 #include <scene_file.hpp>
 #include <vector>
 
+#include "default_medium.hpp"
+
 namespace cumulet::demo {
 
 /// An opened volume and the medium settings derived from it. For a sequence, they are derived from the largest readable
 /// file.
 struct OpenVolume {
-  std::shared_ptr<cumulet_volume> volume;   // null for a sequence
-  std::optional<FrameRow> row;              // files of a sequence
-  double density_scale = 0.0;               // suggested scale; 0: the volume shows nothing at any scale
-  std::optional<cumulet_medium_desc> fire;  // medium of a burning volume
+  std::shared_ptr<cumulet_volume> volume;  // null for a sequence
+  std::optional<FrameRow> row;             // files of a sequence
+  double density_scale = 0.0;              // suggested scale; 0: the volume shows nothing at any scale
+  DefaultMedium look;                      // of a scene that sets no medium
 };
 
-/// Analyzes a volume. Any thread; takes some milliseconds per million voxels.
-[[nodiscard]] OpenVolume look_into(std::shared_ptr<cumulet_volume> volume);
+/// Analyzes a volume of this file. Any thread; takes some milliseconds per million voxels.
+[[nodiscard]] OpenVolume look_into(std::shared_ptr<cumulet_volume> volume, const VolumeFile& file);
 /// Opens a file, or the first readable frame of a sequence, in any thread. Logs the notes and warnings of a file, and
 /// the files that a sequence passes over; frames log when they are played. Throws std::runtime_error with the library's
 /// cause.
@@ -31,7 +33,7 @@ struct OpenVolume {
 [[nodiscard]] OpenVolume open_volume(const VolumeFile& file, cumulet_log_fn log, void* log_user,
                                      const std::function<void(const cumulet_volume&)>& see = {});
 /// Returns the medium that a volume is shown with: the scene's. If the scene does not set the density scale, it is
-/// taken from the volume, or the whole medium is that of a fire.
+/// taken from the volume, or the whole medium is its default medium.
 [[nodiscard]] cumulet_medium_desc medium_of(const SceneVolume& scene, const OpenVolume& open);
 /// Creates a sequence with one file per frame. `file`: how all files are read; its path is ignored. memory_bytes: 0 is
 /// the library's default. Reads nothing yet. Throws std::runtime_error with the library's error text.

@@ -27,9 +27,9 @@
 #include "aovs.hpp"
 #include "checkpoint.hpp"
 #include "cube_lut.hpp"
+#include "default_medium.hpp"
 #include "denoised.hpp"
 #include "early_pictures.hpp"
-#include "fire.hpp"
 #include "fire_look.hpp"
 #include "first_view.hpp"
 #include "frame_plan.hpp"
@@ -48,6 +48,7 @@
 #include "settled.hpp"
 #include "stats.hpp"
 #include "time_limit.hpp"
+#include "tiny_objects.hpp"
 #include "transforms.hpp"
 #include "up_axis.hpp"
 
@@ -58,6 +59,7 @@ using cumulet::demo::Checkpoint;
 using cumulet::demo::driver_of;
 using cumulet::demo::EarlyPictures;
 using cumulet::demo::FireLook;
+using cumulet::demo::fits;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
 using cumulet::demo::one_line;
@@ -326,7 +328,7 @@ class Studio {
       file.log = cumulet::demo::Messages::print, file.log_user = &messages_;
       if (next) {
         load_both(scene, file, *next);
-      } else if (!cumulet::demo::show_fire(viewer_, scene, file)) {
+      } else if (!cumulet::demo::show_by_default(viewer_, scene, file)) {
         check(viewer_, cumulet_load_volume_file(viewer_.get(), &file));
       }
     }
@@ -334,11 +336,9 @@ class Studio {
     if (frame != nullptr) others_.go_to(frame->seconds);
     open_others(scene);
     open_models(scene);
-    fire_ = cumulet::demo::medium_of_fire(viewer_, scene);
-    if (fire_) {
-      check(viewer_, cumulet_set_medium(viewer_.get(), &*fire_));
-      fire_look_.take(viewer_, scene);
-    }
+    look_ = cumulet::demo::default_medium(viewer_, scene);
+    if (look_) check(viewer_, cumulet_set_medium(viewer_.get(), &look_->medium));
+    if (look_ && look_->content == cumulet::demo::Content::fire) fire_look_.take(viewer_, scene);
     wait(viewer_, progress_);
     if (others_.plays()) cumulet_cancel(viewer_.get());  // stops reading ahead in sequences
   }
@@ -347,8 +347,11 @@ class Studio {
   void remark(const SceneOptions& scene) {
     if (scene.is_shown() && scene.auto_density_scale)
       cumulet::demo::print_density_scale(viewer_, !scene.ramps[CUMULET_RAMP_DENSITY].empty(), progress_);
-    if (fire_) cumulet::demo::print_fire(*fire_, progress_);
+    if (look_) cumulet::demo::print_medium(*look_, progress_);
     fire_look_.print_light(progress_);
+    if (!fits(scene.camera) || scene.surface_camera >= 0) return;
+    const auto boxes = cumulet::demo::placed_boxes(viewer_.get(), scene, others_, models_);
+    for (const std::string& line : cumulet::demo::remarks_on_tiny(boxes)) print_line(progress_, line);
   }
 
   /// Applies the settings that need the loaded surfaces: material variant and camera.
@@ -506,7 +509,7 @@ class Studio {
     for (const cumulet::demo::VolumeFile& file : others_.missing(scene.others)) {
       progress_.stage("loading " + file.volume);
       const bool shown = scene.is_shown() && file == static_cast<const cumulet::demo::VolumeFile&>(scene);
-      others_.give(file, shown ? cumulet::demo::look_into(volume_of(viewer_))
+      others_.give(file, shown ? cumulet::demo::look_into(volume_of(viewer_), file)
                                : cumulet::demo::open_volume(file, cumulet::demo::Messages::print, &messages_));
       check_not_interrupted();
     }
@@ -588,7 +591,7 @@ class Studio {
   Timeline timeline_;
   // Looked up first, so that an error is logged before rendering starts.
   cumulet::demo::Denoiser denoiser_;
-  std::optional<cumulet_medium_desc> fire_;  // set if the volume burns and the scene sets no medium
+  std::optional<cumulet::demo::DefaultMedium> look_;  // of fire or smoke, if the scene sets no medium
   Context context_;
   Viewer viewer_;
   cumulet::demo::Instances others_;
@@ -609,8 +612,6 @@ EarlyPictures early_pictures(const RenderOptions& options) {
   const bool alone = options.checkpoint.empty() && options.stats.empty() && options.trace.empty();
   return EarlyPictures(options.format == OutputFormat::png && alone ? std::optional(first_seconds) : std::nullopt);
 }
-
-bool fits(const cumulet_camera_desc& camera) { return std::equal(camera.eye, camera.eye + 3, camera.target); }
 
 /// Places the camera if the scene has none.
 void place_camera(const Viewer& viewer, const RenderOptions& options) {
@@ -659,11 +660,11 @@ bool is_settled(const SceneOptions& scene) {
 /// camera.
 void settle(const Viewer& viewer, RenderOptions& options) {
   SceneOptions& scene = options.scene;
-  const std::optional<cumulet_medium_desc> fire = cumulet::demo::medium_of_fire(viewer, scene);
+  const std::optional<cumulet::demo::DefaultMedium> look = cumulet::demo::default_medium(viewer, scene);
   if (std::exchange(scene.auto_density_scale, false)) {
     double& scale = scene.medium.density_scale;
-    if (fire) {
-      scene.medium = *fire;
+    if (look) {
+      scene.medium = look->medium;
     } else if (cumulet_volume_suggest_density_scale(volume_of(viewer).get(), &scale) != CUMULET_OK) {
       scale = 0.0;  // nothing is visible at any scale
     }

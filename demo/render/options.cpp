@@ -247,7 +247,11 @@ void add_medium_options(CLI::App& app, const char* group, SceneOptions& scene) {
         apply(static_cast<Preset>(found->value), scene.medium);
       },
       "Medium preset; does not set the density scale; other flags override its settings");
-  add_settings(app, group, scene.medium, take_auto);
+  const auto take_special = [take_auto, &scene](std::string_view flag, const std::string& text) {
+    if (flag == "--albedo") scene.albedo_given = true;
+    return take_auto(flag, text);
+  };
+  add_settings(app, group, scene.medium, take_special);
   for (std::size_t i = 0; i < scene.ramps.size(); ++i) {
     add(
         app, group, settings::ramps[i].flag, "X:Y,X:Y,...|none",
@@ -421,8 +425,9 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
       scene.light.ground_albedo = given.ground_albedo;
     } else if (app.count("--ground") == 0) {
       // A model that is cut out for compositing needs none.
-      const bool below_models = files.ground_below_models && scene.display.background == CUMULET_BACKGROUND_SKY;
-      if ((scene.surfaces.empty() && !files.model) || below_models) scene.ground.mode = CUMULET_GROUND_BELOW;
+      const bool cut_out = scene.display.background != CUMULET_BACKGROUND_SKY;
+      const bool has_model = !scene.surfaces.empty() || files.model;
+      if (!has_model || !cut_out) scene.ground.mode = CUMULET_GROUND_BELOW;
     }
   }
   if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
@@ -741,7 +746,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   add_device_options(app, group, options);
 
   if (!parse_arguments(app, std::move(arguments), out)) return std::nullopt;
-  finish_scene_options(app, options.scene, {.scene = lit, .ground_below_models = true});
+  finish_scene_options(app, options.scene, {.scene = lit});
   if (options.thumbnail) {
     make_thumbnail(app, options);
   } else if (!options.output.empty() || app.count("--output") > 0) {

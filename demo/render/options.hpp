@@ -27,11 +27,10 @@ void add_ocio_options(CLI::App& app, const char* group, OcioView& view);
 /// Completes the view after the parse: another tone map or LUT replaces that of a scene file. Throws UsageError for
 /// flags that exclude each other or lack --ocio.
 void finish_ocio_options(const CLI::App& app, OcioView& view);
-/// Kinds of files that were named without a flag, and the default under models.
+/// Kinds of files that were named without a flag.
 struct NamedFiles {
   bool scene = false;  ///< a scene file, which sets the light
   bool model = false;
-  bool ground_below_models = false;
 };
 /// Completes the scene after the parse: sets daylight unless a flag or file sets the light, and checks flags that
 /// exclude each other. Throws UsageError.

@@ -6,7 +6,7 @@
 #include <shader_cache.hpp>
 #include <stdexcept>
 
-#include "fire.hpp"
+#include "default_medium.hpp"
 #include "transforms.hpp"
 
 namespace cumulet::demo {
@@ -90,8 +90,8 @@ bool sets_no_medium(const SceneOptions& scene) {
   return scene.is_shown() && scene.auto_density_scale && is_unsaid(scene.medium);
 }
 
-bool show_fire(const Viewer& viewer, const SceneOptions& scene, const cumulet_volume_file_desc& file) {
-  return sets_no_medium(scene) && show_fire(viewer.get(), file, scene.medium);
+bool show_by_default(const Viewer& viewer, const SceneOptions& scene, const cumulet_volume_file_desc& file) {
+  return sets_no_medium(scene) && show_by_default(viewer.get(), file, scene);
 }
 
 }  // namespace cumulet::demo

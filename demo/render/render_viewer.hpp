@@ -43,8 +43,9 @@ void print_density_scale(const Viewer& viewer, bool ramped, Progress& progress);
 /// Returns true if the medium may be chosen for the scene's volume, because no setting of it is given.
 [[nodiscard]] bool sets_no_medium(const SceneOptions& scene);
 
-/// Reads and shows a file that may burn, if the scene sets no medium. Returns false if it is to be loaded as others
-/// are.
-[[nodiscard]] bool show_fire(const Viewer& viewer, const SceneOptions& scene, const cumulet_volume_file_desc& file);
+/// Reads and shows a file that may hold fire or smoke, if the scene sets no medium. Returns false if it is to be loaded
+/// as others are.
+[[nodiscard]] bool show_by_default(const Viewer& viewer, const SceneOptions& scene,
+                                   const cumulet_volume_file_desc& file);
 
 }  // namespace cumulet::demo

@@ -24,8 +24,7 @@ void apply(Preset preset, cumulet_medium_desc& medium) {
       medium.droplet_diameter = 20.0F;
       break;
     case Preset::smoke:
-      set(medium.coalbedo, 0.35F, 0.35F, 0.34F);
-      medium.anisotropy = 0.3F;
+      set(medium.coalbedo, 0.5F, 0.5F, 0.5F);
       break;
     case Preset::fire:
       set(medium.coalbedo, 0.6F, 0.62F, 0.64F);

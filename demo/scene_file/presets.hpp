@@ -13,7 +13,8 @@ enum class Preset { cumulus, smoke, fire, explosion, ground_fog };
 inline constexpr std::array preset_choices = {
     settings::Choice{"cumulus", static_cast<int>(Preset::cumulus), "Cumulus",
                      "Water droplets without absorption: white."},
-    settings::Choice{"smoke", static_cast<int>(Preset::smoke), "Smoke", "Gray smoke with slight forward scattering."},
+    settings::Choice{"smoke", static_cast<int>(Preset::smoke), "Smoke",
+                     "Gray smoke, as Blender's Principled Volume by default."},
     settings::Choice{"fire", static_cast<int>(Preset::fire), "Fire",
                      "Bright flames from the flame and temperature grids, thin smoke."},
     settings::Choice{"explosion", static_cast<int>(Preset::explosion), "Explosion",

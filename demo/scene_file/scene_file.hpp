@@ -76,6 +76,7 @@ struct SceneVolume : VolumeFile {
   settings::Clip clip;             // in the world space of the file, after to_world
   SceneSequence sequence;          // for a volume that is a sequence
   bool auto_density_scale = true;  // medium.density_scale is derived from the volume when it is loaded
+  bool albedo_given = false;       // the albedo also applies to smoke, which is gray by default
 
   SceneVolume();
   /// Returns the name, or the file name if there is none.

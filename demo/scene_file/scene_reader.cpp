@@ -534,6 +534,7 @@ void read_volume(Reader& reader, SceneFormat format, SceneVolume& volume) {
   reader.text("medium.velocity_grid", volume.velocity_grid);
   reader.choice("volume.up", up_names, volume.up);
   volume.auto_density_scale = reader.word("medium.density_scale", "auto");
+  volume.albedo_given = reader.has("medium.albedo");
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) {
     reader.ramp(settings::ramps[i].key, volume.ramps[i]);
     reader.color_ramp(settings::color_ramps[i], volume.color_ramps[i]);

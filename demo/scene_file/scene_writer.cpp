@@ -115,9 +115,9 @@ class Writer {
     if (!value.empty()) put(key, value);
   }
   template <class Desc>
-  void put_settings(const Desc& desc, const std::string& where = "") {
+  void put_settings(const Desc& desc, const std::string& where = "", std::string_view left_out = "") {
     settings::for_each<Desc>([&](const auto& setting) {
-      if (*setting.key == '\0') return;
+      if (*setting.key == '\0' || setting.key == left_out) return;
       const std::optional<Json> value = json_of(format_, setting, desc.*setting.field);
       if (value) put(where + setting.key, *value);
     });
@@ -187,8 +187,10 @@ void put_volume(Writer& writer, SceneFormat format, const SceneVolume& volume, c
   writer.put_text("medium.color_grid", volume.color_grid);
   writer.put_text("medium.anisotropy_grid", volume.anisotropy_grid);
   writer.put_text("medium.velocity_grid", volume.velocity_grid);
-  if (volume.auto_density_scale && volume.medium.density_scale == 0.0) writer.put("medium.density_scale", "auto");
-  writer.put_settings(volume.medium);
+  const bool is_auto = volume.auto_density_scale && volume.medium.density_scale == 0.0;
+  if (is_auto) writer.put("medium.density_scale", "auto");
+  const bool left = is_auto && !volume.albedo_given && settings::all_zero(volume.medium.coalbedo);
+  writer.put_settings(volume.medium, "", left ? "medium.albedo" : "");
   for (std::size_t i = 0; i < volume.ramps.size(); ++i) {
     Json points = Json::array();
     for (const auto& [value, result] : volume.ramps[i]) points.push_back({shortest(value), shortest(result)});

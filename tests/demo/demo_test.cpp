@@ -367,7 +367,7 @@ TEST(DemoOptions, AcceptSceneFlagsAndAFile) {
   EXPECT_THROW(static_cast<void>(parse_demo_options({"--ocio-view", "Film"}, out)), UsageError);
 }
 
-TEST(DemoModel, ModelRemovesTheDefaultGround) {
+TEST(DemoModel, ModelsStandOnTheDefaultGround) {
   const auto ground_with = [](std::vector<std::string> arguments) {
     std::ostringstream out;
     const auto options = parse_demo_options(std::move(arguments), out);
@@ -379,9 +379,16 @@ TEST(DemoModel, ModelRemovesTheDefaultGround) {
     EXPECT_EQ(model.scene.surfaces, "town.glb");
     return model.scene.ground.mode;
   };
-  EXPECT_EQ(ground_with({}), CUMULET_GROUND_NONE);
-  EXPECT_EQ(ground_with({"--ground", "below"}), CUMULET_GROUND_BELOW);
+  EXPECT_EQ(ground_with({}), CUMULET_GROUND_BELOW);
   EXPECT_EQ(ground_with({"--ground-height", "2"}), CUMULET_GROUND_AT_HEIGHT);
+  for (const char* background : {"transparent", "color"}) {
+    EXPECT_EQ(ground_with({"--background", background}), CUMULET_GROUND_NONE) << "it is cut out";
+    EXPECT_EQ(ground_with({"--background", background, "--ground", "below"}), CUMULET_GROUND_BELOW);
+  }
+  std::ostringstream out;
+  EXPECT_EQ(parse_demo_options({"town.glb"}, out)->scene.ground.mode, CUMULET_GROUND_BELOW);
+  EXPECT_EQ(parse_demo_options({"town.glb", "--background", "transparent"}, out)->scene.ground.mode,
+            CUMULET_GROUND_NONE);
 }
 
 TEST(DemoModel, DefaultsBecomeExplicit) {

@@ -148,6 +148,64 @@ TEST_F(ExtremeFiles, WarmAirDoesNotEmit) {
   }
 }
 
+TEST_F(ExtremeFiles, SmokeIsGrayUnlessTheAlbedoIsGiven) {
+  write("cloud.vdb", {smoke()});
+  write("heated.vdb", {smoke(), heat(0.1F)});
+  write("hot.vdb", {smoke(), heat(600.0F)});
+  write("shaded.vdb", {smoke(), ball("Shadow", [](float) { return -1.0F; })});
+  auto domain = smoke();
+  domain->insertMeta("file_base_resolution", openvdb::Vec3IMetadata({20, 20, 20}));
+  write("mantaflow.vdb", {domain});
+  write("weather.vdb", {smoke(), ball("temperature", [](float) { return 271.0F; })});
+  const Done white = render("cloud.vdb");
+  const Done gray = render("cloud.vdb", "--preset smoke");
+  EXPECT_FALSE(white.says("the volume is smoke")) << white.said;
+  EXPECT_LT(gray.mean(), 0.9 * white.mean());
+  for (const char* file : {"heated.vdb", "hot.vdb", "shaded.vdb", "mantaflow.vdb"}) {
+    const Done found = render(file, "--up y");
+    EXPECT_TRUE(found.says("the volume is smoke: using --preset smoke")) << file << found.said;
+    expect_same_picture(found, gray);
+    const Done given = render(file, "--up y --albedo 1,1,1");
+    EXPECT_FALSE(given.says("the volume is smoke")) << given.said;
+    EXPECT_NEAR(given.mean() / white.mean(), 1.0, 0.05) << file;
+  }
+  const Done weather = render("weather.vdb");
+  EXPECT_FALSE(weather.says("the volume is smoke")) << weather.said;
+  EXPECT_NEAR(weather.mean() / white.mean(), 1.0, 0.05);
+}
+
+TEST_F(ExtremeFiles, SmokeOfASceneKeepsTheSceneAlbedo) {
+  write("cloud.vdb", {smoke()});
+  write("heated.vdb", {smoke(), heat(0.1F)});
+  const auto scene = [&](const std::string& first, const std::string& second, const std::string& albedo) {
+    const std::string medium = R"("medium": {"density_scale": "auto")" + albedo + "}";
+    std::ofstream(path("scene.json")) << R"({"cumulet_scene": 3, "volumes": [{"file": ")" << first << R"(", )" << medium
+                                      << R"(}, {"file": ")" << second << R"(", "translate": [25, 0, 0], )" << medium
+                                      << "}]}";
+    const std::string picture = path("picture.pfm");
+    Done run = command(first, picture, "--scene '" + path("scene.json") + "'");
+    run.pixels = pixels_of(picture);
+    return run;
+  };
+  const Done white = scene("cloud.vdb", "cloud.vdb", "");
+  EXPECT_NEAR(scene("heated.vdb", "heated.vdb", R"(, "albedo": [1, 1, 1])").mean() / white.mean(), 1.0, 0.05);
+  EXPECT_LT(scene("cloud.vdb", "heated.vdb", "").mean(), 0.98 * white.mean()) << "the second volume is gray";
+  EXPECT_LT(scene("heated.vdb", "cloud.vdb", "").mean(), 0.98 * white.mean()) << "the first volume is gray";
+}
+
+TEST_F(ExtremeFiles, ObjectsTooSmallToBeSeenAreNamed) {
+  write("cloud.vdb", {smoke()});
+  const auto said = [&](const std::string& second, const std::string& more) {
+    std::ofstream(path("scene.json")) << R"({"cumulet_scene": 3, "volumes": [{"file": "cloud.vdb"}, )"
+                                      << R"({"file": "cloud.vdb", "name": "the second", )" << second << "}]}";
+    return command("cloud.vdb", path("picture.pfm"), "--scene '" + path("scene.json") + "' " + more).said;
+  };
+  const std::string tiny = R"("scale": [0.005, 0.005, 0.005])";
+  EXPECT_NE(said(tiny, "").find("the second is 20"), std::string::npos);
+  EXPECT_EQ(said(R"("scale": [0.05, 0.05, 0.05])", "").find("times smaller"), std::string::npos);
+  EXPECT_EQ(said(tiny, "--camera '0,0,60 0,0,0 40'").find("times smaller"), std::string::npos) << "a chosen view";
+}
+
 // When a fire goes out, its last frames have only a few kelvin.
 TEST_F(ExtremeFiles, SequenceFramesShareOneScale) {
   write("fire.0001.vdb", {smoke(), heat(2250.0F)});

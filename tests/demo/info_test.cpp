@@ -67,6 +67,26 @@ void expect_line(const std::string& text, const std::string& line) {
   EXPECT_NE(("\n" + text).find("\n" + line + "\n"), std::string::npos) << line << "\nis not a line of\n" << text;
 }
 
+TEST_F(Info, NamesTheContentThatDecidesTheDefaultMedium) {
+  const auto hot = [](const char* name, float value) {
+    auto grid = box(name);
+    grid->tree().setValue({2, 1, 0}, value);
+    return grid;
+  };
+  const auto content = [&](const openvdb::GridPtrVec& grids) {
+    write_vdb("content.vdb", grids);
+    return info_of(volume("content.vdb"))["volume"]["content"].get<std::string>();
+  };
+  EXPECT_EQ(content({box("density")}), "cloud");
+  EXPECT_EQ(content({box("density"), hot("temperature", 271.0F)}), "cloud") << "air";
+  EXPECT_EQ(content({box("density"), hot("temperature", 400.0F)}), "smoke");
+  EXPECT_EQ(content({box("density"), box("shadow")}), "smoke");
+  EXPECT_EQ(content({box("density"), hot("temperature", 1800.0F)}), "fire");
+  EXPECT_EQ(content({box("density"), box("heat")}), "fire") << "2 is 3000 kelvin";
+  EXPECT_EQ(content({box("density"), box("flames")}), "fire");
+  expect_line(lines(volume("content.vdb")), "content: fire");
+}
+
 TEST_F(Info, DescribesAVdb) {
   auto velocity = openvdb::Vec3SGrid::create(openvdb::Vec3s(0));
   velocity->tree().setValue({0, 0, 0}, openvdb::Vec3s(3, 4, 0));

@@ -152,6 +152,59 @@ TEST(PlacementTest, OthersAreAllObjectsWithAKnownBox) {
   EXPECT_EQ(others->most, dvec3(110, 10, 10));
 }
 
+TEST(PlacementTest, SurfacesOfAnotherSizeBecomeAModelWithAPlace) {
+  Model model;
+  model.scene.volume = "/a/cloud.vdb";
+  model.status.boxes.volumes = {{model.scene, cube({0, 0, 0}, 100.0)}};
+  model.scene.surfaces = "/a/fox.glb";
+  model.status.surfaces.triangles = 10;
+  const auto set_size = [&](double side) {
+    for (int axis = 0; axis < 3; ++axis) {
+      model.status.surfaces.bounds_min[axis] = -0.5 * side;
+      model.status.surfaces.bounds_max[axis] = 0.5 * side;
+    }
+  };
+  set_size(50.0);
+  EXPECT_FALSE(place_surfaces(model, 0.0));
+  EXPECT_EQ(model.scene.surfaces, "/a/fox.glb");
+  set_size(0.5);
+  EXPECT_TRUE(place_surfaces(model, 0.0));
+  EXPECT_EQ(model.scene.surfaces, "");
+  ASSERT_EQ(model.scene.models.size(), 1U);
+  EXPECT_EQ(model.scene.models[0].file, "/a/fox.glb");
+  const auto transform = transform_of(model.scene, {Item::Kind::model, 0, 0});
+  ASSERT_TRUE(transform);
+  EXPECT_NEAR((*transform)[0][0], 50.0, 1e-9);
+  ASSERT_EQ(model.messages.size(), 1U);
+  EXPECT_EQ(model.messages[0].text, "fox.glb is 200 times smaller than the scene: scaled by 50");
+}
+
+TEST(PlacementTest, HardlyVisibleObjectsOfASceneAreNamed) {
+  Model model;
+  model.scene.volume = "/a/cloud.vdb";
+  model.scene.models.push_back({"/a/fox.glb"});
+  model.status.boxes.volumes = {{model.scene, cube({0, 0, 0}, 100.0)}};
+  EXPECT_FALSE(remark_on_tiny(model, 0.0)) << "the model is not loaded yet";
+  model.status.boxes.models = {{"/a/fox.glb", cube({0, 0, 0}, 5.0)}};
+  EXPECT_TRUE(remark_on_tiny(model, 0.0));
+  EXPECT_TRUE(model.messages.empty());
+  model.status.boxes.models = {{"/a/fox.glb", cube({0, 0, 0}, 0.5)}};
+  EXPECT_TRUE(remark_on_tiny(model, 0.0));
+  ASSERT_EQ(model.messages.size(), 1U);
+  EXPECT_TRUE(model.messages[0].text.starts_with("fox.glb is 200 times smaller than the scene"))
+      << model.messages[0].text;
+  model.scene.models[0].visible = false;
+  model.messages.clear();
+  EXPECT_TRUE(remark_on_tiny(model, 0.0));
+  EXPECT_TRUE(model.messages.empty()) << "hidden by the user";
+  // Two clouds that are far from each other
+  model.scene.transforms = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
+  model.scene.others.emplace_back().volume = "/a/other.vdb";
+  model.status.boxes.volumes.emplace_back(model.scene.others[0], cube({50000, 0, 0}, 100.0));
+  EXPECT_TRUE(remark_on_tiny(model, 0.0));
+  EXPECT_EQ(model.messages.size(), 2U);
+}
+
 TEST(NumberFormat, HasNoExponentForUsualNumbers) {
   EXPECT_EQ(plain_format("%.4g W", 37120.0), "%.0f W");
   EXPECT_EQ(plain_format("%.3g", -5e6), "%.0f");

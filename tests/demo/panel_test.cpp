@@ -387,13 +387,14 @@ INSTANTIATE_TEST_SUITE_P(Scales, PanelTest, cumulet::test::panel_sizes());
 
 TEST(Menus, ReachEveryAction) {
   // Actions of dialogs, messages, of the outliner and of Escape.
-  const std::set<Action> elsewhere = {
-      Action::add_volume,     Action::add_model,        Action::save_scene_as, Action::save_png,
-      Action::save_exr,       Action::discard_changes,  Action::recover,       Action::cancel,
-      Action::choose_grid,    Action::discard_recovery, Action::clear_log,     Action::render,
-      Action::show_in_folder, Action::quit_anyway,      Action::cancel_render, Action::clear_renders,
-      Action::daylight,       Action::keep_place,       Action::follow_light,  Action::open_sample,
-      Action::ocio_dialog,    Action::open_ocio,        Action::go_to};
+  const std::set<Action> elsewhere = {Action::add_volume,       Action::add_model,    Action::save_scene_as,
+                                      Action::save_png,         Action::save_exr,     Action::discard_changes,
+                                      Action::recover,          Action::cancel,       Action::choose_grid,
+                                      Action::discard_recovery, Action::clear_log,    Action::render,
+                                      Action::show_in_folder,   Action::quit_anyway,  Action::cancel_render,
+                                      Action::clear_renders,    Action::daylight,     Action::white,
+                                      Action::keep_place,       Action::follow_light, Action::open_sample,
+                                      Action::ocio_dialog,      Action::open_ocio,    Action::go_to};
   for (int i = 0; i <= static_cast<int>(Action::about); ++i) {
     const auto action = static_cast<Action>(i);
     const bool listed = std::ranges::any_of(menus(), [&](const Menu& menu) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <thread>
 #include <vector>
@@ -78,6 +79,56 @@ TEST_F(RecentThumbnailsTest, AChangedFileHasANewOne) {
   EXPECT_NE(thumbnails.find(files[0]), first);
 }
 
+TEST_F(RecentThumbnailsTest, ASceneHasANewOneWhenAFileThatItUsesChanges) {
+  RecentThumbnails thumbnails(script("echo >\"$4\""), cache_);
+  for (const char* used : {"a.vdb", "b.vdb", "c.glb", "d.hdr", "frame_1.vdb", "frame_2.vdb"}) file(used);
+  const std::vector<std::string> files = {file("scene.json", R"({"cumulet_scene": 3,
+    "volumes": [{"file": "a.vdb"}, {"file": "b.vdb"}, {"file": "frame_#.vdb"}], "models": [{"file": "c.glb"}],
+    "environment": {"file": "d.hdr"}})")};
+  finish(thumbnails, files);
+  std::string before = thumbnails.find(files[0]);
+  EXPECT_NE(before, "");
+  for (const char* used : {"a.vdb", "b.vdb", "c.glb", "d.hdr", "frame_2.vdb"}) {
+    file(used, "changed");
+    EXPECT_EQ(thumbnails.find(files[0]), "") << used;
+    finish(thumbnails, files);
+    const std::string now = thumbnails.find(files[0]);
+    EXPECT_NE(now, "");
+    EXPECT_NE(now, before);
+    before = now;
+  }
+  fs::remove(folder_ / "b.vdb");
+  EXPECT_EQ(thumbnails.find(files[0]), "") << "it is gone";
+  file("scene.json", "damaged");
+  finish(thumbnails, files);
+  EXPECT_NE(thumbnails.find(files[0]), "");
+}
+
+TEST_F(RecentThumbnailsTest, OldOnesOfOtherFilesAreRemoved) {
+  const std::vector<std::string> files = {file("a.vdb"), file("b.vdb")};
+  const std::string program = script("echo >\"$4\"");
+  RecentThumbnails first(program, cache_);
+  finish(first, files);
+  const auto longer_ago = [](const std::string& path, int days) {
+    fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::hours(24 * days));
+  };
+  longer_ago(first.find(files[0]), 1000);
+  const std::string kept = file("cache/thumbnails/notes.png");
+  longer_ago(kept, 2000);
+  for (int i = 0; i < 80; ++i) {
+    std::string name = "cache/thumbnails/0123456789abcd00.png";
+    name.replace(name.size() - 6, 2, std::to_string(10 + i));
+    longer_ago(file(name), 1 + i);
+  }
+  RecentThumbnails second(program, cache_);
+  finish(second, files);
+  EXPECT_NE(second.find(files[0]), "") << "it is listed";
+  EXPECT_TRUE(fs::exists(kept)) << "not a thumbnail";
+  EXPECT_TRUE(fs::exists(folder_ / "cache/thumbnails/0123456789abcd10.png")) << "the newest one";
+  EXPECT_FALSE(fs::exists(folder_ / "cache/thumbnails/0123456789abcd89.png")) << "the oldest one";
+  EXPECT_EQ(std::distance(fs::directory_iterator(cache_), {}), 2 + 64 + 1);
+}
+
 TEST_F(RecentThumbnailsTest, AFailureIsNotRepeatedForTheSameContent) {
   RecentThumbnails thumbnails(script("echo part >\"$4\"; exit 1"), cache_);
   const std::vector<std::string> files = {file("damaged.vdb"), file("other.vdb")};
@@ -104,12 +155,13 @@ TEST_F(RecentThumbnailsTest, FilesAreLookedAtOncePerSecond) {
   RecentThumbnails thumbnails(script("cat \"$5\" >\"$4\""), cache_);
   const std::vector<std::string> files = {file("a.vdb")};
   finish(thumbnails, files);
-  EXPECT_TRUE(thumbnails.follow(files, 1000.0));
+  const double later = now_ + 10.0;
+  EXPECT_TRUE(thumbnails.follow(files, later));
   fs::remove(thumbnails.find(files[0]));
-  EXPECT_FALSE(thumbnails.follow(files, 1000.5)) << "nothing is read in most frames";
+  EXPECT_FALSE(thumbnails.follow(files, later + 0.5)) << "nothing is read in most frames";
   EXPECT_FALSE(thumbnails.works());
-  EXPECT_TRUE(thumbnails.follow(std::vector<std::string>(), 1000.6)) << "another list";
-  EXPECT_TRUE(thumbnails.follow(files, 1002.0));
+  EXPECT_TRUE(thumbnails.follow(std::vector<std::string>(), later + 0.6)) << "another list";
+  EXPECT_TRUE(thumbnails.follow(files, later + 2.0));
   EXPECT_TRUE(thumbnails.works());
 }
 

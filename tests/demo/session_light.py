@@ -223,6 +223,23 @@ def test_fire(s):
     assert f'--flame-strength {medium("named")["flame_strength"]:g}' in done.stderr, (done.stderr, medium("named"))
 
 
+def test_smoke(s):
+    """Smoke is gray by default. A button makes it white, and the choice stays with a saved scene."""
+    saves = ["key ctrl+s", "frames 2", "key ctrl+a", f'text "{s.out}/saved.json"', "key enter", "frames 3"]
+    smoke = ["--density-scale", "auto", "--temperature-grid", "none", "--flame-grid", "none"]
+    s.play("replay", [*SETTLE, *shot("gray"), 'click "Message/White"', *SETTLE, *shot("white"), *saves, *SETTLE, "key ctrl+z", *SETTLE,
+                      'report "undone.json"', f'drop "{s.cumulus}"', *SETTLE, 'report "cloud.json"', f'drop "{s.out}/saved.json"', *SETTLE,
+                      'report "again.json"'], *smoke, "--volume", s.explosion)
+    albedo = lambda name: s.report(name)["scene"]["medium"]["albedo"]
+    messages = [m for m in s.report("gray")["messages"] if "smoke" in m["text"]]
+    assert [m["button"] for m in messages] == ["White"], messages
+    assert albedo("gray") == albedo("undone") == [0.5] * 3, albedo("gray")
+    assert albedo("white") == albedo("cloud") == albedo("again") == [1] * 3, albedo("white")
+    assert_differ(look(s, "gray")[0], look(s, "white")[0], look(s, "gray")[2])
+    s.play("given", ["wait loaded", *SETTLE, 'report "given.json"'], *smoke, "--albedo", "1,1,1", "--volume", s.explosion)
+    assert albedo("given") == [1] * 3 and s.report("given")["messages"] == [], s.report("given")["messages"]
+
+
 def test_ramps(s):
     """A ramp with the grid's own values changes nothing. Points are dragged, added by clicks and removed by right
     clicks."""

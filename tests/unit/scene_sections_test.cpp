@@ -69,6 +69,18 @@ TEST(SceneFile, TransformIsAMatrixOrTranslationRotationScale) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(file.to_world[8 + i], expected[4 + i], 1e-12) << i;
 }
 
+TEST(SceneFile, AnAlbedoOfOneIsSavedIfItIsGiven) {
+  SceneOptions scene;
+  scene.others.emplace_back().volume = "b.vdb";
+  const auto again = [&] { return parse_scene(scene_text(scene, "s.json"), "s.json"); };
+  EXPECT_FALSE(again().albedo_given || again().others.front().albedo_given) << "smoke would not be gray";
+  scene.albedo_given = scene.others.front().albedo_given = true;
+  EXPECT_TRUE(again().albedo_given && again().others.front().albedo_given);
+  SceneOptions loaded;
+  loaded.medium.density_scale = 2.0;
+  EXPECT_TRUE(parse_scene(scene_text(loaded, "s.json"), "s.json").albedo_given) << "a cloud that was shown stays white";
+}
+
 TEST(SceneFile, KeepsTheViewOfOpenColorIo) {
   SceneOptions scene;
   scene.volume = "/a/cloud.vdb";
