@@ -230,6 +230,8 @@ on many machines. cumulet-scene writes a sample scene.")
   # EGL is loaded by name.
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "${same_version}, python3:any (>= 3.8), libegl1")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS libgl1-mesa-dri)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_LIST_DIR}/debian/postinst
+                                                ${CMAKE_CURRENT_LIST_DIR}/debian/prerm)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "libosmesa6, python3-numpy, python3-tqdm")
   set(CPACK_DEBIAN_PYTHON_DESCRIPTION "path-traced volumes - Python package
 import cumulet renders OpenVDB and NanoVDB volumes, NumPy arrays and glTF

@@ -36,6 +36,8 @@ for file in usr/bin/cumulet-{render,merge,farm,demo,scene} usr/share/man/man1/cu
   usr/share/doc/cumulet/{README,CHANGELOG,CONTRIBUTING}.md usr/share/doc/cumulet/examples/python/metaballs.py; do
   [ -s "$root/$file" ] || fail "no package has $file"
 done
+# Modules that Python has compiled are removed with the package.
+[[ $(dpkg-deb -I "$work"/pack/python3-cumulet_*.deb prerm) == *py3clean* ]] || fail "python3-cumulet leaves files behind"
 apt-get --simulate --no-download --no-install-recommends install "${debs[@]}" >"$work/apt.log" 2>&1 ||
   { cat "$work/apt.log"; fail "apt cannot install them here"; }
 
