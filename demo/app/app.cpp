@@ -139,7 +139,7 @@ void App::frame() {
   replay_.order = {};
   if (replay_.player) {
     ReplayHost host;
-    host.loading = model_.status.busy || exchange_.waiting();
+    host.loading = loads();
     host.rendering = pictures_.queue().unfinished() > 0;
     host.converged = exchange_.settled() && (model_.status.frame.flags & CUMULET_RENDER_CONVERGED) != 0;
     host.viewport = image_->viewport();
@@ -189,7 +189,7 @@ void App::frame() {
   const bool picture = frames_.drawn_pictures != frames_.pictures;
   const bool drawn = draw();
   obey(replay_.order);
-  if (replay_.recorder) replay_.recorder->frame(events, model_.status.busy || exchange_.waiting());
+  if (replay_.recorder) replay_.recorder->frame(events, loads());
   if (drawn) {
     window_->swap();
     ++frames_.drawn;
@@ -252,6 +252,9 @@ void App::handle_key(const Event& event) {
   if (event.down && (io.WantCaptureKeyboard || io.WantTextInput)) return;
   image_->to_viewer(event);
 }
+
+// While a sequence plays, its next frames are read and built, which does not end in a loop.
+bool App::loads() const { return (model_.status.busy && !model_.playing) || exchange_.waiting(); }
 
 bool App::is_unsaid() const {
   cumulet_medium_desc medium = model_.scene.medium;

@@ -49,6 +49,8 @@ class App {
  private:
   void frame();
   [[nodiscard]] double patience() const;
+  /// Returns true while files are read or the scene is prepared.
+  [[nodiscard]] bool loads() const;
   /// Returns true if a replay controls the program. Each frame then waits for the image that it requested.
   [[nodiscard]] bool stepped() const { return replay_.player && replay_.order.idle <= 0.0; }
 
