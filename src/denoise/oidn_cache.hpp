@@ -12,18 +12,18 @@ namespace cumulet::denoise {
 /// Keeps the library that was requested last, and that it cannot be used.
 class OidnCache {
  public:
-  /// Returns the library, or null if it cannot be used. Logs that once.
-  OidnLibraryPtr get(const std::string& file, const Log& log) {
+  /// Returns the library, or null if it cannot be used. Logs that once. instead: the denoiser that is used then.
+  OidnLibraryPtr get(const std::string& file, const std::string& instead, const Log& log) {
     if (file_ == file) return library_;
     file_ = file;
     library_ = nullptr;
     try {
       library_ = std::make_shared<const OidnLibrary>(file);
       log.info("denoising by Open Image Denoise " + library_->version());
+    } catch (const OidnMissing& error) {
+      log.write(LogLevel::debug, text_of(error, instead));  // it need not be installed
     } catch (const OidnError& error) {
-      // It need not be installed, but a file that is named is expected.
-      log.write(file.empty() ? LogLevel::debug : LogLevel::warning,
-                std::string("not denoising by the library of Open Image Denoise: ") + error.what());
+      log.warning(text_of(error, instead));
     }
     return library_;
   }
@@ -34,6 +34,10 @@ class OidnCache {
   }
 
  private:
+  static std::string text_of(const OidnError& error, const std::string& instead) {
+    return std::string("not denoising by the library of Open Image Denoise but by ") + instead + ": " + error.what();
+  }
+
   std::optional<std::string> file_;
   OidnLibraryPtr library_;
 };

@@ -33,9 +33,17 @@ void* load(const std::string& file) {
     const char* const cause = dlerror();
     throw OidnError(ErrorCode::unsupported, cause != nullptr ? cause : file + ": cannot be loaded");
   }
-  for (const char* const name : usual_names)
+  std::string broken;
+  for (const char* const name : usual_names) {
     if (void* const library = open(name)) return library;
-  throw OidnError(ErrorCode::unsupported, "libOpenImageDenoise.so is not installed");
+    const char* const error = dlerror();
+    const std::string cause = error != nullptr ? error : name;
+    // The error has a path, or the name of another library, only if a file was found. Its text may be translated.
+    const bool found = cause.find('/') != std::string::npos || cause.find(name) == std::string::npos;
+    if (found && broken.empty()) broken = std::string(name) + " is installed but cannot be loaded: " + cause;
+  }
+  if (!broken.empty()) throw OidnError(ErrorCode::unsupported, broken);
+  throw OidnMissing(ErrorCode::unsupported, "libOpenImageDenoise.so is not installed");
 }
 
 template <class Function>

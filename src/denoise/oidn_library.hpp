@@ -15,6 +15,12 @@ class OidnError : public Error {
   using Error::Error;
 };
 
+/// No library with a usual name is installed.
+class OidnMissing : public OidnError {
+ public:
+  using OidnError::OidnError;
+};
+
 /// Pixels of an image in main memory, row by row.
 struct OidnImage {
   glm::uvec2 size{0U};
@@ -26,8 +32,8 @@ struct OidnImage {
 /// Intel's Open Image Denoise, version 1.4 or later, loaded at run time. Not thread safe.
 class OidnLibrary {
  public:
-  /// Loads the library; "": by its usual names. Throws OidnError, also for a version that is too old. The
-  /// process keeps the library, whose threads may outlive its use.
+  /// Loads the library; "": by its usual names. Throws OidnError, also for a version that is too old, and OidnMissing
+  /// for "" if none is installed. The process keeps the library, whose threads may outlive its use.
   explicit OidnLibrary(const std::string& file);
 
   /// Returns the version, such as "2.3.0".

@@ -362,7 +362,8 @@ void Viewer::read_linear(float* rgba, std::size_t count) {
 void Viewer::read_denoised(const char* network_file, const char* oidn_library, float* rgba, std::size_t count) {
   in_context([&](Context& g) {
     Denoisers by;
-    if (oidn_library != nullptr && g.functions()->dispatches_in_call) by.library = oidn_.get(oidn_library, log_);
+    if (oidn_library != nullptr && g.functions()->dispatches_in_call)
+      by.library = oidn_.get(oidn_library, network_file != nullptr ? "its network" : "the fast filter", log_);
     const auto read = [&] {
       // A library needs no weights, and reads none that are missing.
       if (by.library == nullptr && network_file != nullptr) by.network = networks_.get(network_file);

@@ -157,19 +157,21 @@ TEST_F(ExtremeFiles, SmokeIsGrayUnlessTheAlbedoIsGiven) {
   domain->insertMeta("file_base_resolution", openvdb::Vec3IMetadata({20, 20, 20}));
   write("mantaflow.vdb", {domain});
   write("weather.vdb", {smoke(), ball("temperature", [](float) { return 271.0F; })});
-  const Done white = render("cloud.vdb");
-  const Done gray = render("cloud.vdb", "--preset smoke");
+  // Fitted cameras and grounds also see the temperatures.
+  const std::string view = "--camera '9.5,12,45 9.5,9.5,9.5 30' --ground none ";
+  const Done white = render("cloud.vdb", view);
+  const Done gray = render("cloud.vdb", view + "--preset smoke");
   EXPECT_FALSE(white.says("the volume is smoke")) << white.said;
   EXPECT_LT(gray.mean(), 0.9 * white.mean());
   for (const char* file : {"heated.vdb", "hot.vdb", "shaded.vdb", "mantaflow.vdb"}) {
-    const Done found = render(file, "--up y");
+    const Done found = render(file, view);
     EXPECT_TRUE(found.says("the volume is smoke: using --preset smoke")) << file << found.said;
     expect_same_picture(found, gray);
-    const Done given = render(file, "--up y --albedo 1,1,1");
+    const Done given = render(file, view + "--albedo 1,1,1");
     EXPECT_FALSE(given.says("the volume is smoke")) << given.said;
     EXPECT_NEAR(given.mean() / white.mean(), 1.0, 0.05) << file;
   }
-  const Done weather = render("weather.vdb");
+  const Done weather = render("weather.vdb", view);
   EXPECT_FALSE(weather.says("the volume is smoke")) << weather.said;
   EXPECT_NEAR(weather.mean() / white.mean(), 1.0, 0.05);
 }
@@ -183,7 +185,7 @@ TEST_F(ExtremeFiles, SmokeOfASceneKeepsTheSceneAlbedo) {
                                       << R"(}, {"file": ")" << second << R"(", "translate": [25, 0, 0], )" << medium
                                       << "}]}";
     const std::string picture = path("picture.pfm");
-    Done run = command(first, picture, "--scene '" + path("scene.json") + "'");
+    Done run = command(first, picture, "--scene '" + path("scene.json") + "' --camera '20,12,70 20,9.5,9.5 40'");
     run.pixels = pixels_of(picture);
     return run;
   };

@@ -1,5 +1,6 @@
 """cumulet-render --denoise high by a library of Open Image Denoise, which needs no networks. The library of the test adds
-green. Without it the filter denoises, and lines say so.
+green. Without it the filter denoises, and lines say so, also for an
+installed library that cannot be loaded.
 
 Usage: oidn_library.py RENDER CLOUD LIBRARY OUT_FOLDER
 """
@@ -34,6 +35,15 @@ def main():
         assert green < 15 and said not in messages and "using the fast filter: " in messages, (green, messages)
     green, messages = run("missing", "--oidn-library", str(out / "none.so"))
     assert green < 15 and messages.count("none.so") == 1 and "using the fast filter unless" in messages, (green, messages)
+    # Libraries with the usual names that are not libraries
+    broken = out / "broken"
+    broken.mkdir(exist_ok=True)
+    for number in (1, 2):
+        (broken / f"libOpenImageDenoise.so.{number}").write_text("no library " * 100)
+    green, messages = run("broken", LD_LIBRARY_PATH=str(broken))
+    lines = [line for line in messages.splitlines() if "is installed but cannot be loaded" in line]
+    assert green < 15 and len(lines) == 1, messages
+    assert f"{broken}/libOpenImageDenoise.so.2: " in lines[0] and "by the fast filter" in lines[0], lines
 
 
 main()
