@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 
 constexpr int low_priority = 10;       // the user's work comes first
 constexpr const char* part = ".part";  // ending of an unfinished thumbnail, behind the number of its process
-constexpr std::size_t max_kept = 64;  // thumbnails that are kept for files that are not listed
+constexpr std::size_t max_kept = 64;   // thumbnails that are kept for files that are not listed
 
 /// Returns a text that changes with the file's content; "" if it does not exist.
 std::string state_of(const std::string& file) {
