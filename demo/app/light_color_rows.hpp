@@ -17,7 +17,7 @@ class LightColorRows {
   ~LightColorRows() = default;
 
   /// Returns true if the user changed the color.
-  bool draw(const char* label, const char* tip, float (&color)[3]);
+  bool draw(const char* label, const char* tip, float (&rgb)[3]);
 
  private:
   bool temperature(Rgb& color);
