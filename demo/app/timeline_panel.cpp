@@ -129,19 +129,20 @@ float width_of(const Ui& ui, const LegendEntry& entry) {
 }
 
 /// Draws the legend at the right of the row, as far as it has room.
-void draw_legend(const Ui& ui, const std::vector<LegendEntry>& legend, float from) {
+void draw_legend(const Ui& ui, std::vector<LegendEntry> legend, float from) {
+  std::ranges::reverse(legend);
   float x = ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x;
   const float y = ImGui::GetCursorScreenPos().y;
   ImDrawList& list = *ImGui::GetWindowDrawList();
-  for (auto entry = legend.rbegin(); entry != legend.rend(); ++entry) {
-    x -= width_of(ui, *entry);
+  for (const LegendEntry& entry : legend) {
+    x -= width_of(ui, entry);
     if (x < from) return;
     const float middle = y + 0.5f * ImGui::GetFrameHeight();
     const float left = x + ui.px(12.0f);
     const float half = ui.px(4.5f);
-    list.AddRectFilled({left, middle - half}, {left + 2.0f * half, middle + half}, entry->color);
+    list.AddRectFilled({left, middle - half}, {left + 2.0f * half, middle + half}, entry.color);
     list.AddText({left + ui.px(14.0f), middle - 0.5f * ImGui::GetTextLineHeight()},
-                 ImGui::GetColorU32(ImGuiCol_TextDisabled), entry->text.c_str());
+                 ImGui::GetColorU32(ImGuiCol_TextDisabled), entry.text.c_str());
   }
 }
 
