@@ -21,7 +21,7 @@ struct Stand {
 using ObjectMatrix = std::array<double, 16>;
 [[nodiscard]] ObjectMatrix matrix_of(const Stand& stand);
 /// Returns nullopt for transforms with shear or a reflection, and for those that are not invertible.
-[[nodiscard]] std::optional<Stand> stand_of(const ObjectMatrix& matrix);
+[[nodiscard]] std::optional<Stand> stand_of(const ObjectMatrix& numbers);
 
 /// Rows of the panel that edit the transform of an object.
 class TransformRows {
