@@ -84,7 +84,7 @@ def compiler_with_libcxx(folder):
 
 
 def build(source, folder, clang):
-    off = [f"-DCUMULET_{what}=OFF" for what in OFF]
+    off = [f"-DCUMULET_{feature}=OFF" for feature in OFF]
     # TinyGLTF is compiled from its header, for the same reason.
     output("cmake", "-S", source, "-B", folder, "-G", "Ninja", f"-DCMAKE_CXX_COMPILER={clang}",
            f"-DCMAKE_C_COMPILER={clang[:-2]}", f"-DCMAKE_CXX_FLAGS={FLAGS}", "-DCMAKE_CXX_FLAGS_RELEASE=-O1",

@@ -158,7 +158,7 @@ StageKeys stage_keys(const PathFeatures& features) {
   Macros intersect{macros::surfaces(1)};
   if (features.extended_bsdf > 0) {
     shade.push_back(macros::extended_bsdf(features.extended_bsdf));
-    // Only what passes through clear surfaces depends on thin films there.
+    // Only the light that passes through clear surfaces depends on thin films there.
     intersect.push_back(macros::extended_bsdf(features.clear_surfaces ? features.extended_bsdf : 1));
     if (features.clear_surfaces) intersect.push_back(macros::clear_surfaces(1));
   }
