@@ -26,6 +26,13 @@ const OtherVolume* find_other(const Status& status, const VolumeFile& file) {
   return found == status.others.end() ? nullptr : &*found;
 }
 
+/// Returns a function that draws the row of a field of the medium.
+auto row_of(Rows& rows, Desc& medium) {
+  return [&rows, &medium](auto field) {
+    settings::with(field, [&](const auto& setting) { rows.draw(setting, medium.*field); });
+  };
+}
+
 }  // namespace
 
 void Panel::medium(Model& model, std::size_t index, std::vector<Command>& commands) {
@@ -57,16 +64,12 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
   ui_.group("Scattering", true, "Material/Scattering", [&] { scattering(medium); });
   if (has_fire(fields)) ui_.group("Fire", true, "Material/Fire", [&] { fire(medium, volume, fields); });
   const bool glows = medium.emission[0] > 0.0f || medium.emission[1] > 0.0f || medium.emission[2] > 0.0f;
-  ui_.group("Emission", glows, "Material/Emission", [&] {
-    settings::with(&Desc::emission, [&](const auto& setting) { rows_.draw(setting, medium.emission); });
-  });
+  const auto row = row_of(rows_, medium);
+  ui_.group("Emission", glows, "Material/Emission", [&] { row(&Desc::emission); });
   const bool is_hot = has_grid(fields, CUMULET_RAMP_TEMPERATURE) && medium.blackbody > 0.0f;
   // The first volume's maximum applies to all.
   if (first || is_hot)
     ui_.group("Advanced", false, "Material/Advanced", [&] {
-      const auto row = [&](auto field) {
-        settings::with(field, [&](const auto& setting) { rows_.draw(setting, medium.*field); });
-      };
       if (first) row(&Desc::max_bounces);
       if (is_hot) row(&Desc::temperature_offset);
     });
@@ -92,9 +95,7 @@ void Panel::medium(Model& model, std::size_t index, std::vector<Command>& comman
 }
 
 void Panel::scattering(Desc& medium) {
-  const auto row = [&](auto field) {
-    settings::with(field, [&](const auto& setting) { rows_.draw(setting, medium.*field); });
-  };
+  const auto row = row_of(rows_, medium);
   row(&Desc::coalbedo);
   absorption(medium.coalbedo);
   row(&Desc::phase);
@@ -106,9 +107,7 @@ void Panel::scattering(Desc& medium) {
 }
 
 void Panel::fire(Desc& medium, const SceneVolume& volume, const Fields& fields) {
-  const auto row = [&](auto field) {
-    settings::with(field, [&](const auto& setting) { rows_.draw(setting, medium.*field); });
-  };
+  const auto row = row_of(rows_, medium);
   if (has_grid(fields, CUMULET_RAMP_TEMPERATURE)) {
     row(&Desc::blackbody);
     // Without brightness nothing else has an effect.
