@@ -73,14 +73,17 @@ TEST(GltfMaterialLayers, TransmissiveSurfacesBoundVolumesOnBothSides) {
   EXPECT_EQ(triangle_flags(*glass, glass->pose(0.0))[0] & (TriangleFlags::ask | TriangleFlags::one_sided), 0U);
 }
 
-TEST(GltfMaterialLayers, UnusedMaterialsDoNotSelectTheExtendedShaders) {
+// The packed data of a model with these material extensions. shown: its triangle has the material.
+scene::ModelSourcePtr source_of(const json& extensions, bool shown) {
+  GltfModel model = layered_model(extensions);
+  if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
+  const ScenePtr scene = imported(model);
   Progress progress;
-  const auto rich = [&](const json& extensions, bool shown) {
-    GltfModel model = layered_model(extensions);
-    if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
-    const ScenePtr scene = imported(model);
-    return scene::make_model_source(scene, scene->pose(0.0), &progress)->bsdf;
-  };
+  return scene::make_model_source(scene, scene->pose(0.0), &progress);
+}
+
+TEST(GltfMaterialLayers, UnusedMaterialsDoNotSelectTheExtendedShaders) {
+  const auto rich = [](const json& extensions, bool shown) { return source_of(extensions, shown)->bsdf; };
   const json sheen = {{"KHR_materials_sheen", {{"sheenColorFactor", {0, 0.1, 0}}}}};
   EXPECT_EQ(rich(sheen, true), BsdfVariant::extended);
   EXPECT_EQ(rich(sheen, false), BsdfVariant::basic);
@@ -97,13 +100,7 @@ TEST(GltfMaterialLayers, UnusedMaterialsDoNotSelectTheExtendedShaders) {
 }
 
 TEST(GltfMaterialLayers, OnlyShownThinWallsThatTransmitAreClear) {
-  Progress progress;
-  const auto clear = [&](const json& extensions, bool shown) {
-    GltfModel model = layered_model(extensions);
-    if (!shown) model.root["meshes"][0]["primitives"][0].erase("material");
-    const ScenePtr scene = imported(model);
-    return scene::make_model_source(scene, scene->pose(0.0), &progress)->clear_surfaces;
-  };
+  const auto clear = [](const json& extensions, bool shown) { return source_of(extensions, shown)->clear_surfaces; };
   const json through = {{"transmissionFactor", 0.5}};
   EXPECT_TRUE(clear({{"KHR_materials_transmission", through}}, true));
   EXPECT_FALSE(clear({{"KHR_materials_transmission", through}}, false));
