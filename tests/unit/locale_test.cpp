@@ -169,7 +169,8 @@ void add_arrays(Texts& texts, const fs::path& folder) {
     for (const auto& lines : {messages.warnings, messages.hints}) {
       for (const std::string& line : lines) text += '\n' + line;
     }
-    for (const volume::GridInfo& grid : volume::Inspection(folder / name).grids()) {
+    const volume::Inspection inspection(folder / name);
+    for (const volume::GridInfo& grid : inspection.grids()) {
       for (const volume::Metadata& entry : grid.metadata) text += '\n' + entry.name + '=' + entry.value;
     }
   }
