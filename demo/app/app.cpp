@@ -324,9 +324,9 @@ void App::accept(const Answer& answer) {
     exchange_.drawn = answer.desired;
   }
   exchange_.answered = answer.desired;
+  camera_moved_ |= answer.camera_moved && !exchange_.waiting();  // a fit after a load is not a motion
   exchange_.loads = answer.waiting;
   exchange_.answered_edits = answer.edits;
-  camera_moved_ |= answer.camera_moved;
   if (answer.camera_moved) {
     end_shutter(model_.scene);
     end_shutter(sent.scene);
