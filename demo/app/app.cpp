@@ -281,7 +281,7 @@ void App::ask() {
   DesiredState desired;
   desired.number = sent.number;
   desired.scene = model_.scene;
-  if (model_.status.play) desired.scene.surface.time = std::max(model_.clock, 0.0);
+  if (model_.status.play) set_animation_time(desired.scene, model_.clock);
   desired.edits.camera = sent.edits.camera + (same_camera(desired.scene.camera, sent.scene.camera) ? 0 : 1);
   const bool load = std::exchange(loading_.reload, false) || volume_of(desired.scene) != volume_of(sent.scene);
   desired.edits.volume = sent.edits.volume + (load ? 1 : 0);

@@ -452,7 +452,7 @@ void App::render_picture() {
   SceneOptions scene = model_.scene;
   if (const auto& play = model_.status.play) {
     scene.sequence.frame = play->frame();
-    scene.surface.time = std::max(model_.clock, 0.0);
+    set_animation_time(scene, model_.clock);
   }
   try {
     pictures_.add(job_of(panel_.render_dialog().settings(), scene));

@@ -285,7 +285,7 @@ struct Model {
   std::optional<Subject> subject;  // shown in the inspector; nullopt: the first object
   std::vector<Item> marked;        // objects that are selected together with the subject, which is one of them
   bool playing = false;
-  double clock = 0.0;               // seconds; the surfaces' animation uses it too if a sequence is shown
+  double clock = 0.0;               // seconds; the animations of models use it too if a sequence is shown
   std::optional<std::string> undo;  // name of the step that can be undone
   std::optional<std::string> redo;  // name of the step that can be repeated
   std::string scene_path;           // scene file that was opened or saved last

@@ -129,7 +129,7 @@ void PictureRun::go_to(const Play& play, std::uint32_t index) {
   static_cast<void>(cumulet_sequence_set_frame(play.sequence.get(), index));
   if (cumulet_sequence_get_time_of(play.sequence.get(), index, &seconds) != CUMULET_OK) return;
   ++desired_.number;
-  desired_.scene.surface.time = std::max(seconds, 0.0);
+  set_animation_time(desired_.scene, seconds);
 }
 
 Answer PictureRun::turn() {

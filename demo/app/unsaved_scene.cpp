@@ -61,7 +61,7 @@ void App::save_scene(const std::string& path) {
   scene.height = static_cast<std::uint32_t>(std::clamp(image_->viewport().height, 1.0, 16384.0));
   if (model_.status.play) {
     scene.sequence.frame = model_.status.play->frame();
-    if (!scene.surfaces.empty()) scene.surface.time = std::max(model_.clock, 0.0);
+    set_animation_time(scene, model_.clock);
   }
   try {
     demo::save_scene(scene, path);

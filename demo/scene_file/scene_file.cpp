@@ -111,6 +111,12 @@ void end_shutter(SceneOptions& scene) {
   scene.camera_close.reset();
 }
 
+void set_animation_time(SceneOptions& scene, double seconds) {
+  const double time = std::max(seconds, 0.0);
+  if (!scene.surfaces.empty()) scene.surface.time = time;
+  for (SceneModel& model : scene.models) model.time = time;
+}
+
 std::string animation_refusal(const std::string& file, std::uint32_t wanted, std::uint32_t animations) {
   if (wanted == 0 || wanted < animations) return {};  // 0 is the default, also for a file without animations
   return file + ": no animation " + std::to_string(wanted) + "; the file has " + std::to_string(animations);

@@ -171,6 +171,8 @@ void look_through(SceneOptions& scene, const std::string& name);
 [[nodiscard]] const NamedCamera* looked_through(const SceneOptions& scene);
 /// Removes the camera's shutter poses: a camera that the user moves is static.
 void end_shutter(SceneOptions& scene);
+/// Sets the time, in seconds, of the animations of the surfaces and of all models. Negative times count as 0.
+void set_animation_time(SceneOptions& scene, double seconds);
 
 /// Returns true if the scene contains no volume and no surfaces.
 [[nodiscard]] inline bool is_empty(const SceneOptions& scene) {

@@ -392,6 +392,21 @@ TEST(SceneFile, ModelsRoundTrip) {
   EXPECT_EQ(alone.surface.lighting, CUMULET_SURFACE_LIGHTING_DIRECT);
 }
 
+TEST(SceneFile, AnimationTimeAppliesToAllModels) {
+  SceneOptions scene;
+  scene.models.resize(2);
+  set_animation_time(scene, 1.5);
+  EXPECT_EQ(scene.models[0].time, 1.5);
+  EXPECT_EQ(scene.models[1].time, 1.5);
+  EXPECT_EQ(scene.surface.time, 0.0) << "without surfaces, a scene file could not be read with it";
+  scene.surfaces = "/data/town.glb";
+  set_animation_time(scene, 2.5);
+  EXPECT_EQ(scene.surface.time, 2.5);
+  set_animation_time(scene, -1.0);
+  EXPECT_EQ(scene.surface.time, 0.0);
+  EXPECT_EQ(scene.models[1].time, 0.0);
+}
+
 TEST(SceneFile, ModelTransformIsTranslationRotationScale) {
   const SceneOptions scene = parse_scene(
       R"({"cumulet_scene": 2, "models": [{"file": "a.glb", "translate": [1, 2, 3], "rotate_degrees": [0, 90, 0],
