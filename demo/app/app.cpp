@@ -343,7 +343,7 @@ void App::accept(const Answer& answer) {
   if (!exchange_.waiting() && !loading_.environment.empty()) {
     if (model_.scene.environment == loading_.environment) {
       take_daylight(model_.scene);
-      show_default_ground(model_, false);  // the map has its own
+      set_default_ground(model_, CUMULET_GROUND_SHADOW_CATCHER_BELOW);  // the map shows its own ground
     }
     loading_.environment.clear();
   }

@@ -88,7 +88,7 @@ struct App::Commands {
        [](App& app, const Command&) {
          app.model_.scene.environment.clear();
          give_daylight(app.model_.scene);
-         show_default_ground(app.model_, true);
+         set_default_ground(app.model_, CUMULET_GROUND_BELOW);
        }},
       {Action::ocio_dialog,
        [](App& app, const Command&) { app.open_dialog("Open OpenColorIO configuration", Action::open_ocio, {".ocio"}); }},

@@ -182,13 +182,12 @@ void open_surfaces(Model& model, const std::string& path) {
   model.scene.surface_variant.clear();
   model.scene.surface_camera = -1;
   // A model that is cut out for compositing needs no ground.
-  if (model.scene.display.background != CUMULET_BACKGROUND_SKY) show_default_ground(model, false);
+  if (model.scene.display.background != CUMULET_BACKGROUND_SKY) set_default_ground(model, CUMULET_GROUND_NONE);
 }
 
-void show_default_ground(Model& model, bool shows) {
+void set_default_ground(Model& model, cumulet_ground_mode wanted) {
   auto& mode = model.scene.ground.mode;
-  if (model.unchosen_ground && mode != CUMULET_GROUND_AT_HEIGHT)
-    mode = shows ? CUMULET_GROUND_BELOW : CUMULET_GROUND_NONE;
+  if (model.unchosen_ground && !is_at_height(mode)) mode = wanted;
 }
 
 std::span<const std::string> listed_files(const Preferences& preferences) {

@@ -307,8 +307,8 @@ struct Model {
   Model();
 };
 
-/// Shows or hides the ground below the scene, unless the user or a scene file has chosen one.
-void show_default_ground(Model& model, bool shows);
+/// Sets the kind of the ground below the scene, unless the user or a scene file has chosen one.
+void set_default_ground(Model& model, cumulet_ground_mode wanted);
 
 /// Opens the surfaces of a file, which replace the previous ones.
 void open_surfaces(Model& model, const std::string& path);

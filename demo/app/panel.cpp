@@ -219,8 +219,9 @@ void Panel::ground(Model& model) {
   cumulet_ground_desc& ground = model.scene.ground;
   using Desc = cumulet_ground_desc;
   settings::for_each<Desc>([&](const auto& setting) {
-    if (setting.is(&Desc::albedo) && ground.mode == CUMULET_GROUND_NONE) return;
-    if (setting.is(&Desc::height) && ground.mode != CUMULET_GROUND_AT_HEIGHT) return;
+    const bool is_diffuse = ground.mode != CUMULET_GROUND_NONE && !is_shadow_catcher(ground.mode);
+    if (setting.is(&Desc::albedo) && !is_diffuse) return;
+    if (setting.is(&Desc::height) && !is_at_height(ground.mode)) return;
     const bool chosen = rows_.draw(setting, ground.*setting.field);
     if (chosen && setting.is(&Desc::mode)) model.unchosen_ground = false;
   });

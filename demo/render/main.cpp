@@ -653,7 +653,7 @@ void render(RenderOptions options) {
 bool is_settled(const SceneOptions& scene) {
   const bool has_camera = scene.surface_camera >= 0 || !fits(scene.camera);
   const bool heated = scene.is_shown() && scene.temperature_grid != "none" && scene.medium.temperature_scale == 0.0F;
-  return has_camera && !heated && !scene.auto_density_scale && scene.ground.mode != CUMULET_GROUND_BELOW;
+  return has_camera && !heated && !scene.auto_density_scale && !cumulet::demo::is_below(scene.ground.mode);
 }
 
 /// Sets the settings that are derived from the loaded volume: density scale, temperature scale, ground height and
@@ -674,8 +674,8 @@ void settle(const Viewer& viewer, RenderOptions& options) {
     scene.medium.temperature_scale = cumulet::demo::temperature_scale_of(volume_of(viewer).get()).value_or(0.0F);
     check(viewer, cumulet_set_medium(viewer.get(), &scene.medium));
   }
-  if (scene.ground.mode == CUMULET_GROUND_BELOW) {
-    scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
+  if (cumulet::demo::is_below(scene.ground.mode)) {
+    scene.ground.mode = cumulet::demo::at_height(scene.ground.mode);
     scene.ground.height = cumulet::demo::ground_below(viewer, scene);
     check(viewer, cumulet_set_ground(viewer.get(), &scene.ground));
   }

@@ -430,9 +430,14 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
       if (!has_model || !cut_out) scene.ground.mode = CUMULET_GROUND_BELOW;
     }
   }
-  if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.mode = CUMULET_GROUND_AT_HEIGHT;
-  if (app.count("--ground-height") > 0 && scene.ground.mode != CUMULET_GROUND_AT_HEIGHT)
-    throw UsageError("--ground-height needs --ground at-height");
+  const bool with_scene = files.scene || app.count("--scene") > 0;
+  // The environment shows its own ground.
+  if (!with_scene && !scene.environment.empty() && app.count("--ground") == 0 &&
+      scene.display.background == CUMULET_BACKGROUND_SKY)
+    scene.ground.mode = CUMULET_GROUND_SHADOW_CATCHER_BELOW;
+  if (app.count("--ground-height") > 0 && app.count("--ground") == 0) scene.ground.mode = at_height(scene.ground.mode);
+  if (app.count("--ground-height") > 0 && !is_at_height(scene.ground.mode))
+    throw UsageError("--ground-height needs --ground at-height or --ground shadow-catcher-at-height");
 }
 
 bool parse_arguments(CLI::App& app, std::vector<std::string> arguments, std::ostream& out) {

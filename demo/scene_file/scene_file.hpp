@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "ground_mode.hpp"
 #include "keys.hpp"
 #include "names.hpp"
 #include "ocio_view.hpp"

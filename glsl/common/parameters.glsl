@@ -203,9 +203,10 @@ CM_BLOCK(CmEnvironment) {
 
 // The ground plane below everything (glsl/surface/ground.glsl). Written by render::GpuScene.
 CM_BLOCK(CmGround) {
-  CM_ALIGN(16) vec3 albedo;
-  float height;  // world
-  float reach;   // rays hit it only up to this distance; 0: there is no ground
+  CM_ALIGN(16) vec3 albedo;  // of a shadow catcher: divided by the background's radiance
+  float height;              // world
+  float reach;               // rays hit it only up to this distance; 0: there is no ground
+  uint catches;              // 1: it is a shadow catcher
   CM_EQUALITY(CmGround)
 };
 

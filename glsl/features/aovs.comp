@@ -135,7 +135,7 @@ vec3 cm_to_sun(vec2 u) {
 // Optical depth from a point (world) to infinity along d; 1e30 if a surface or the ground is in between.
 float cm_depth_to_far(vec3 from, vec3 d) {
   vec3 o = cm_to_cube_point(from);
-  if (cm_ground_distance(o, cm_to_cube(d)) < CM_NO_GROUND) return 1e30;
+  if (cm_solid_ground_distance(o, cm_to_cube(d)) < CM_NO_GROUND) return 1e30;
 #if CM_SURFACES
   CmHit hit;
   cm_hit_camera = false;

@@ -144,7 +144,7 @@ void main() {
       solid = cm_matte_ids[first_model + cm_model_of(hit.triangle)];
     }
 #endif
-    float ground_t = cm_ground_distance(ray.o, ray.d);
+    float ground_t = cm_solid_ground_distance(ray.o, ray.d);
     if (ground_t < min(solid_t, CM_NO_GROUND)) {
       solid_t = ground_t;
       solid = cm_matte_ids[0];

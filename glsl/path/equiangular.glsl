@@ -107,7 +107,7 @@ CM_FN CmPassed cm_pass(CM_INOUT(CmPath) p, CmVertex vertex) {
   passed.light = p.throughput * light / (analytic_light.probability * pdf);
   passed.o = p.o + t * p.d;
   // A ray of no length, or a light on it, gives NaN or infinity.
-  bool hidden = cm_ground_distance(passed.o, cm_to_cube(passed.direction)) < passed.distance;
+  bool hidden = cm_solid_ground_distance(passed.o, cm_to_cube(passed.direction)) < passed.distance;
   float strongest = max(passed.light.x, max(passed.light.y, passed.light.z));
   passed.to_light = !hidden && angle > 0.0f && cm_is_positive(strongest) && strongest < 3.0e38f;
   // In a dense medium, estimated from the optical depth that the ray used, collisions find the light as well. Lights

@@ -111,7 +111,8 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.through = 0u;
   p.dispersed = 0u;
 #endif
-  p.light = cm_background_radiance(p.w);
+  vec3 background = cm_background_radiance(p.w);
+  p.light = background;
   p.steps = 0u;
   p.depth_0 = cm_free_depth(along.x);
   p.depth = p.depth_0;
@@ -123,7 +124,10 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
   p.reach = t_per_z * cm_camera_end(p, at, within, layer, along.y);
   float ground = cm_ground_distance(p.o, p.d);
   p.to_ground = cm_ground_ends(ground, p.reach) ? 1u : 0u;
-  if (p.to_ground != 0u) p.at_layer = 0u;
+  if (p.to_ground != 0u) {
+    p.at_layer = 0u;
+    p.light = background;
+  }
   p.reach = min(p.reach, ground);
   p.stage = CM_STAGE_AIM;
 #if CM_GROUPS
@@ -133,12 +137,15 @@ CM_FN void cm_camera(CM_INOUT(CmPath) p, uint samples, uvec2 at) {
 }
 
 // Adds the contribution of a ray that left the bounds or reached its end. Distant light can be found both by NEE and by
-// a scattered ray that escapes. The MIS weights of both include the transmittance.
-CM_FN void cm_escape(CM_INOUT(CmPath) p) {
+// a scattered ray that escapes. The MIS weights of both include the transmittance, except for rays from a shadow
+// catcher. blocked: the ray from the catcher did not escape, and the light that it missed is subtracted.
+CM_FN void cm_escape(CM_INOUT(CmPath) p, bool blocked) {
   float depth = p.depth_0 - p.depth;
-  float transmittance = exp(-depth);
+  float transmittance = blocked ? 1.0f : exp(-depth);
   if (p.ray == CM_RAY_SCATTERED) {
+    if (blocked) p.throughput = -p.throughput;
     if (p.bounces > 0u) p.radiance += p.throughput * cm_far_light(p, transmittance);
+    if (blocked) p.throughput = -p.throughput;
   } else {
     float survival = min(1.0f, exp(CM_SHADOW_DEPTH - depth));
     p.radiance += p.light * (transmittance / (survival * (1.0f + transmittance * p.pdf)));
@@ -172,7 +179,17 @@ CM_FN bool cm_arrive(CM_INOUT(CmPath) p, bool collided, bool grounded) {
   if (collided && p.bounces == 0u) p.in_volume = 1u;
   p.bounces += 1u;
   if (collided) p.throughput *= CM_MEDIUM.albedo;
-  if (grounded) p.throughput *= cm.ground.albedo;
+  if (grounded) {
+    if (cm_ground_catches()) {
+      // A camera ray, whose p.light is the radiance of the background.
+      p.radiance += p.throughput * p.light;
+#if CM_GROUPS
+      cm_add_to_group(cm.integrator.sky_group, p.throughput * p.light);
+#endif
+      p.throughput *= p.light;
+    }
+    p.throughput *= cm.ground.albedo;
+  }
 #if CM_CHANNELS && defined(CM_MARCH)  // without CM_MARCH there are no collisions
   if (collided && CM_MEDIUM.colored != 0u) p.throughput *= cm_march_color(p.cell, cm_in_volume_point(p.o + p.t * p.d));
 #endif
@@ -282,6 +299,16 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
 #if CM_GROUPS
     p.group = cm_group_of(light.kind);
 #endif
+    if (cm_on_catcher(p)) {
+      p.light /= 1.0f + p.pdf;
+      p.pdf = 0.0f;
+      if (cm_is_far(light) || light.kind == CM_LIGHT_SUN) {
+        p.radiance -= p.light;
+#if CM_GROUPS
+        cm_add_to_group(p.group, -p.light);
+#endif
+      }
+    }
   } else {
     p.throughput *= scatter.weight;
     p.w = light.direction;
@@ -296,7 +323,7 @@ CM_FN void cm_scatter(CM_INOUT(CmPath) p, CmVertex vertex, CmNee nee) {
   p.found = CM_FOUND_NOT_ASKED;
   p.depth_0 = cm_free_depth(nee.draw.u_distance) + (to_light ? CM_SHADOW_DEPTH : 0.0f);
   p.depth = p.depth_0;
-  float ground = cm_ground_distance(p.o, p.d);
+  float ground = cm_solid_ground_distance(p.o, p.d);
   bool ground_ends = cm_ground_ends(ground, light.distance);
   p.to_ground = !to_light && ground_ends ? 1u : 0u;
   bool hidden = to_light && ground_ends;
@@ -343,7 +370,9 @@ CM_FN bool cm_end_ray(CM_INOUT(CmPath) p, CmVertex vertex, CM_OUT(bool) arrived)
     return true;
   }
 #endif
-  if (escaped) cm_escape(p);
+  // Light that escaping rays from a catcher bring is part of the background's radiance.
+  bool from_catcher = scattered && cm_on_catcher(p);
+  if (escaped != from_catcher) cm_escape(p, from_catcher);
   bool finished = escaped && scattered;
   if (hit_triangle) cm_see(p, vertex);
   bool dark = (hit_triangle && cm_among_surfaces_dark(p) && !cm_came_through(p)) ||

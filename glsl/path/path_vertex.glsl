@@ -74,6 +74,8 @@ CM_FN float cm_anisotropy(CmPath p) {
 #endif
 
 CM_FN bool cm_on_ground(CmPath p) { return CM_GROUND != 0 && p.start == CM_ON_GROUND; }
+// Returns true if the ray's origin is the point where the camera ray hit a shadow catcher.
+CM_FN bool cm_on_catcher(CmPath p) { return cm_ground_catches() && cm_on_ground(p); }
 // Returns true if the ray hits the ground, unless something blocks it.
 CM_FN bool cm_goes_to_ground(CmPath p) { return CM_GROUND != 0 && p.to_ground != 0u; }
 

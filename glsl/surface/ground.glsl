@@ -1,5 +1,10 @@
 // The ground: an infinite level plane with Lambertian reflection. Rays hit it only from above. Shared by GLSL and C++;
 // the includer has glsl/traversal/ray.glsl.
+//
+// A shadow catcher is a ground that only camera rays hit. Its albedo is pi / E times the radiance B of the background
+// in the ray's direction, where E is the irradiance of sun and sky on a horizontal plane. Without objects it therefore
+// reflects B. The estimator adds B, and subtracts the light that an unoccluded ray would bring from every sample of sun
+// and sky (a control variate with the mean B). So the catcher has no noise where nothing shades it.
 #ifndef CM_GROUND_GLSL
 #define CM_GROUND_GLSL
 
@@ -20,6 +25,13 @@ CM_FN float cm_ground_distance(vec3 o, vec3 d) {
 #else
   return CM_NO_GROUND;
 #endif
+}
+
+CM_FN bool cm_ground_catches() { return CM_GROUND != 0 && cm.ground.catches != 0u; }
+
+// The same for rays that are not camera rays.
+CM_FN float cm_solid_ground_distance(vec3 o, vec3 d) {
+  return cm_ground_catches() ? CM_NO_GROUND : cm_ground_distance(o, d);
 }
 
 // Returns true if the ground is the end of a ray that otherwise ends at `reach`.

@@ -52,6 +52,7 @@ vec3 unpack(const Packed& packed) {
 struct RowSums {
   double weight = 0.0;  // sum of luminance x sine
   glm::dvec3 mean{0.0};
+  glm::dvec3 level{0.0};  // sum of radiance times the positive cosine from +Y
   // Sums of radiance times w, and times products of w's components.
   std::array<glm::dvec3, 3> first{};
   std::array<glm::dvec3, 5> second{};  // xy, yz, zx, xx, yy
@@ -59,6 +60,7 @@ struct RowSums {
 
   void add(const glm::dvec3& w, const glm::dvec3& light) {
     mean += light;
+    level += std::max(0.0, w.y) * light;
     for (int i = 0; i < 3; ++i) first[static_cast<std::size_t>(i)] += w[i] * light;
     second[0] += w.x * w.y * light;
     second[1] += w.y * w.z * light;
@@ -69,6 +71,7 @@ struct RowSums {
   void add(const RowSums& row) {
     weight += row.weight;
     mean += row.mean;
+    level += row.level;
     for (std::size_t i = 0; i < first.size(); ++i) first[i] += row.first[i];
     for (std::size_t i = 0; i < second.size(); ++i) second[i] += row.second[i];
     replaced += row.replaced;
@@ -180,10 +183,11 @@ EnvironmentPtr make_environment(const EnvironmentPixels& pixels, const std::stri
     sines += pixels.width * std::sin(std::numbers::pi * (y + 0.5) / pixels.height);
   }
   made->mean = all.mean / sines;
+  const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(texels);
+  made->level_irradiance = unit * all.level;
   made->harmonics = all.harmonics(sines);
   made->replaced = all.replaced;
   if (all.weight > 0.0) {
-    const double unit = 2.0 * std::numbers::pi * std::numbers::pi / static_cast<double>(texels);
     made->density = static_cast<float>(1.0 / (all.weight * unit));
     const std::vector<Alias> aliases = run_cancellable(
         progress,

@@ -39,7 +39,8 @@ struct Environment {
   /// word is at most x, else texel y. Texels are sampled by luminance times the sine of the row's angle from +Y. z, w:
   /// red and green, and blue, as halves, in units of the float whose upper half is that of w.
   std::vector<glm::uvec4> words;
-  glm::dvec3 mean{0.0};  ///< over all directions
+  glm::dvec3 mean{0.0};              ///< over all directions
+  glm::dvec3 level_irradiance{0.0};  ///< on a horizontal plane that faces up (+Y)
   Harmonics harmonics{};
   PrefilteredEnvironmentPtr prefiltered;  ///< prefiltered maps for glossy reflection; null: the environment is constant
   /// Solid-angle pdf of sampling a texel, divided by the texel's luminance: 1 / (sum of weights x texel solid angle /

@@ -65,6 +65,13 @@ glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings)
   return glm::vec3(surroundings.environment->mean * double{surroundings.strength});
 }
 
+glm::vec3 level_irradiance(const DistantLights& distant, const Surroundings& surroundings) {
+  const glm::dvec3 sky = surroundings.environment
+                             ? surroundings.environment->level_irradiance * double{surroundings.strength}
+                             : std::numbers::pi * glm::dvec3(distant.sky_radiance);
+  return glm::vec3(sky + glm::dvec3(distant.sun_irradiance) * std::max(0.0, distant.to_sun.y));
+}
+
 glm::vec2 turn_of(const Surroundings& surroundings) {
   const double angle = surroundings.rotation_degrees * std::numbers::pi / 180.0;
   return {std::cos(angle), std::sin(angle)};

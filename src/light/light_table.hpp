@@ -33,6 +33,10 @@ Harmonics harmonics_of(const Surroundings& surroundings);
 /// Returns the radiance of the sky, or the mean radiance of the environment that replaces it.
 glm::vec3 sky_of(const DistantLights& distant, const Surroundings& surroundings);
 
+/// Returns the irradiance of sun and sky, or of the environment that replaces the sky, on a horizontal plane that faces
+/// up.
+glm::vec3 level_irradiance(const DistantLights& distant, const Surroundings& surroundings);
+
 /// A value: recomputed when a light changes.
 class LightTable {
  public:

@@ -51,11 +51,12 @@ struct ViewEnds {
   bool operator==(const ViewEnds&) const = default;
 };
 
-/// Infinite horizontal diffuse ground plane, visible only from above.
+/// Infinite horizontal ground plane, visible only from above.
 struct Ground {
   double height = 0.0;
   glm::vec3 albedo{0.0F};
-  double reach = 0.0;  ///< maximum ray length at which the ground is hit; farther hits are invisible
+  double reach = 0.0;           ///< maximum ray length at which the ground is hit; farther hits are invisible
+  bool shadow_catcher = false;  ///< its albedo is ignored
   bool operator==(const Ground&) const = default;
 };
 

@@ -55,7 +55,11 @@ inline constexpr std::array sky_choices = {
 inline constexpr std::array ground_choices = {
     Choice{"none", CUMULET_GROUND_NONE, "None", "No ground plane."},
     Choice{"below", CUMULET_GROUND_BELOW, "Below", "Ground plane at the lowest point of volumes and surfaces."},
-    Choice{"at-height", CUMULET_GROUND_AT_HEIGHT, "At a height", "Ground plane at the height set below."}};
+    Choice{"at-height", CUMULET_GROUND_AT_HEIGHT, "At a height", "Ground plane at the height set below."},
+    Choice{"shadow-catcher", CUMULET_GROUND_SHADOW_CATCHER_BELOW, "Shadow catcher",
+           "Shadows on the ground of the environment or sky, at the lowest point of volumes and surfaces."},
+    Choice{"shadow-catcher-at-height", CUMULET_GROUND_SHADOW_CATCHER_AT_HEIGHT, "Shadow catcher at a height",
+           "Shadows on the ground of the environment or sky, at the height set below."}};
 inline constexpr std::array repeat_choices = {
     Choice{"hold", CUMULET_REPEAT_HOLD, "Hold",
            "Shows the first frame before the start and the last frame after the end."},
@@ -354,12 +358,14 @@ struct Table<cumulet_ground_desc> {
   static constexpr std::tuple rows = {
       Setting(&Desc::mode, {.name = "mode", .choices = ground_choices,
         .key = "ground.mode", .flag = "--ground",
-        .help = "Ground plane, an infinite diffuse plane (default: below, if no light is given; with a model only "
-                "in cumulet-render with --background sky; else none)",
-        .row = {.label = "Ground", .tip = "Infinite diffuse ground plane."}}),
+        .help = "Ground plane, infinite: diffuse, or a shadow catcher, which shows the ground of the environment or sky "
+                "with the shadows on it (default: below, if no light is given; with a model only in cumulet-render "
+                "with --background sky; shadow-catcher, if an environment is given; else none)",
+        .row = {.label = "Ground", .tip = "Infinite ground plane."}}),
       Setting(&Desc::height, {.name = "height", .range = {-1e30, 1e30},
         .key = "ground.height", .flag = "--ground-height", .type = "Y",
-        .help = "Height (y) of the ground plane (default: 0); implies --ground at-height",
+        .help = "Height (y) of the ground plane (default: 0); implies --ground at-height, or "
+                "shadow-catcher-at-height with an environment",
         .row = {.label = "Ground height",
                 .tip = "Height (y) of the ground plane.",
                 .least = -1e3, .most = 1e3, .format = "%.4g"}}),

@@ -98,9 +98,13 @@ struct GroundSettings {
   GroundMode mode = GroundMode::none;
   double height = 0.0;
   glm::vec3 albedo{0.3F};
+  bool shadow_catcher = false;
 
   static GroundSettings of(const cumulet_ground_desc& d) {
-    return {static_cast<GroundMode>(d.mode), d.height, glm::make_vec3(d.albedo)};
+    const bool catcher =
+        d.mode == CUMULET_GROUND_SHADOW_CATCHER_BELOW || d.mode == CUMULET_GROUND_SHADOW_CATCHER_AT_HEIGHT;
+    constexpr int other = CUMULET_GROUND_SHADOW_CATCHER_BELOW - CUMULET_GROUND_BELOW;
+    return {static_cast<GroundMode>(catcher ? d.mode - other : d.mode), d.height, glm::make_vec3(d.albedo), catcher};
   }
 };
 

@@ -101,7 +101,7 @@ void SkyStage::sync() {
 
 std::optional<light::Day> SkyStage::day() const {
   if (!light_.sky) return std::nullopt;
-  return light::Day{*light_.sky, light_.sun_elevation_degrees, has_ground()};
+  return light::Day{*light_.sky, light_.sun_elevation_degrees, has_ground() && !ground_.shadow_catcher};
 }
 
 void SkyStage::update() {
@@ -131,7 +131,7 @@ std::optional<scene::Ground> SkyStage::ground(const std::optional<Bounds>& box, 
                                               const std::optional<glm::dvec3>& eye) const {
   // A ground plane at a given height is also shown without other objects: a sequence's frame may be empty.
   if (!has_ground() || (ground_.mode == GroundMode::below && !box)) return std::nullopt;
-  scene::Ground ground{ground_.height, ground_.albedo};
+  scene::Ground ground{ground_.height, ground_.albedo, 0.0, ground_.shadow_catcher};
   // With models it is slightly below the bounds, because many models include a floor.
   if (ground_.mode == GroundMode::below)
     ground.height = box->min.y - (shows_triangles ? 1e-4 * glm::distance(box->min, box->max) : 0.0);

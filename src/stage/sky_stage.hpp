@@ -33,7 +33,11 @@ class SkyStage {
   const light::EnvironmentPtr& environment();
   void set_environment_settings(const EnvironmentSettings& settings);
   void set_ground(const GroundSettings& settings);
-  [[nodiscard]] bool has_ground() const { return ground_.mode != GroundMode::none; }
+  /// The background decides whether a shadow catcher is there. shows_sky: it is the sky or the environment.
+  void set_background(bool shows_sky) { shows_sky_ = shows_sky; }
+  [[nodiscard]] bool has_ground() const {
+    return ground_.mode != GroundMode::none && (shows_sky_ || !ground_.shadow_catcher);
+  }
   /// Takes the results of the builder.
   void sync();
 
@@ -63,6 +67,7 @@ class SkyStage {
   light::EnvironmentPtr environment_;        // newest
   EnvironmentSettings environment_settings_;
   GroundSettings ground_;
+  bool shows_sky_ = true;
   scene::Part<light::DistantLights> lights_;
   scene::Part<light::Surroundings> surroundings_;
   light::AnalyticLights analytic_lights_;  // set by the host, in world space

@@ -249,7 +249,8 @@ void Context::read_mattes(const Shot& shot, const MatteIdOf& id_of, std::uint32_
     object.id = model.id;
     ids.models.push_back(model.holdout || model.shadow_only ? 0 : id_of(object));
   }
-  if (*shot.scene->ground) ids.ground = id_of({.kind = MatteObject::Kind::ground});
+  if (*shot.scene->ground && !(**shot.scene->ground).shadow_catcher)
+    ids.ground = id_of({.kind = MatteObject::Kind::ground});
   progressive_.tracer().feature_pass().read_mattes(picture, *scene_.data(), inputs, ids, ranks, values);
 }
 

@@ -153,6 +153,7 @@ void Viewer::set_display(const DisplaySettings& display) {
   render::DisplayLutPtr lut = std::move(display_.lut);
   display_ = display;
   display_.lut = std::move(lut);
+  stage_.sky.set_background(!display.transparent && !display.backdrop);
   touch();
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -228,6 +229,21 @@ TEST_P(LightGroups, ContainTheirOwnBackground) {
   for (std::size_t i = 0; i < count; ++i)
     EXPECT_NEAR(with_sky[3 * i], without_sky[3 * i] + (1.0F - rgba[4 * i + 3]) * 0.4F, 1e-5F) << i;
   EXPECT_GT(with_sky[0], without_sky[0]);
+}
+
+TEST_P(LightGroups, SumToTheImageOnAShadowCatcher) {
+  const SurfacesRef panes = make_panes(4.0F);
+  auto ground = make_desc<cumulet_ground_desc>();
+  ground.mode = CUMULET_GROUND_SHADOW_CATCHER_BELOW;
+  ASSERT_EQ(cumulet_set_ground(v_, &ground), CUMULET_OK);
+  for (const bool surfaces : {false, true}) {
+    ASSERT_EQ(cumulet_set_surfaces(v_, surfaces ? panes.get() : nullptr), CUMULET_OK);
+    set(16, 0, groups);
+    make();
+    const std::vector<Rgb> all = all_groups();
+    expect_sum(all, rgb_linear());
+    EXPECT_LT(*std::ranges::min_element(all[sun]), 0.0F) << "the sun's group has no shadow";
+  }
 }
 
 TEST_P(LightGroups, GroupsBeyondTheLimitCountInTheFirst) {

@@ -162,6 +162,18 @@ TEST(Options, DefaultLightShinesOnAGround) {
   EXPECT_EQ(ground({"--gltf", "m.glb", "--sky", "1,1,1"}), CUMULET_GROUND_NONE);
 }
 
+TEST(Options, EnvironmentsShowShadowsOnTheirGround) {
+  const auto ground = [](std::vector<std::string> more) { return parse(std::move(more)).scene.ground.mode; };
+  EXPECT_EQ(ground({"--env", "a.hdr"}), CUMULET_GROUND_SHADOW_CATCHER_BELOW);
+  EXPECT_EQ(ground({"--env", "a.hdr", "--ground-height", "2"}), CUMULET_GROUND_SHADOW_CATCHER_AT_HEIGHT);
+  EXPECT_EQ(ground({"--env", "a.hdr", "--ground", "none"}), CUMULET_GROUND_NONE);
+  EXPECT_EQ(ground({"--env", "a.hdr", "--ground", "at-height", "--ground-height", "2"}), CUMULET_GROUND_AT_HEIGHT);
+  EXPECT_EQ(ground({"--env", "a.hdr", "--background", "transparent"}), CUMULET_GROUND_NONE);
+  EXPECT_EQ(ground({"--ground-height", "2"}), CUMULET_GROUND_AT_HEIGHT);
+  EXPECT_THROW(static_cast<void>(ground({"--env", "a.hdr", "--ground", "shadow-catcher", "--ground-height", "2"})),
+               UsageError);
+}
+
 TEST(Options, SkyModelReplacesOnlyTheSun) {
   const RenderOptions clear = parse({"--sky-model", "2.5,.25", "--sun", "120,20"});
   EXPECT_EQ(clear.scene.light.sky, CUMULET_SKY_PHYSICAL);

@@ -2440,20 +2440,29 @@ typedef struct cumulet_environment_settings_desc {
 /** Whether there is a ground plane, and its height. */
 typedef enum cumulet_ground_mode {
   CUMULET_GROUND_NONE = 0,
-  CUMULET_GROUND_BELOW = 1,    /**< At the lowest point of volume and surfaces. */
-  CUMULET_GROUND_AT_HEIGHT = 2 /**< At cumulet_ground_desc.height. */
+  CUMULET_GROUND_BELOW = 1,                   /**< At the lowest point of volume and surfaces. */
+  CUMULET_GROUND_AT_HEIGHT = 2,               /**< At cumulet_ground_desc.height. */
+  CUMULET_GROUND_SHADOW_CATCHER_BELOW = 3,    /**< A shadow catcher at the lowest point of volume and surfaces. */
+  CUMULET_GROUND_SHADOW_CATCHER_AT_HEIGHT = 4 /**< A shadow catcher at cumulet_ground_desc.height. */
 } cumulet_ground_mode;
 
 /**
- * An infinite horizontal diffuse plane that receives shadows. It is invisible from
- * below. The image and its alpha contain it; AOVs of depth, normal and albedo, and rasterized surfaces of previews, do
- * not. With a ground, a physical sky is black below the horizon. A change restarts accumulation.
+ * An infinite horizontal plane that receives shadows. It is invisible from below. A change restarts accumulation.
+ *
+ * - A diffuse ground has an albedo and lights the objects above it. The image and its alpha contain it; AOVs of depth,
+ *   normal and albedo, and rasterized surfaces of previews, do not. With it, a physical sky is black below the horizon.
+ * - A shadow catcher shows the ground of an environment map, or the lit ground of a physical sky, with the shadows of
+ *   volume and surfaces. Only camera rays hit it, so it does not light the objects. Its radiance is B x R, where B is
+ *   the radiance of the background behind it. R is the irradiance that arrives on it, divided by the irradiance of sun
+ *   and sky without objects. Light of fire and of lights makes it brighter. Where nothing shades or lights it, it is
+ *   the background, without noise. It is there only with CUMULET_BACKGROUND_SKY, and its alpha is 1. Cryptomatte does
+ *   not contain it.
  */
 typedef struct cumulet_ground_desc {
   size_t struct_size;
   cumulet_ground_mode mode;
-  double height;   /**< World y, for CUMULET_GROUND_AT_HEIGHT; within 1e30. */
-  float albedo[3]; /**< Each in [0, 1]. All 0: 0.3. */
+  double height;   /**< World y, for the modes at a height; within 1e30. */
+  float albedo[3]; /**< Each in [0, 1]. All 0: 0.3. A shadow catcher ignores it. */
 } cumulet_ground_desc;
 
 /** The rendered view: the path-traced image, or a debug view of the grid. */
@@ -4117,7 +4126,8 @@ CUMULET_API cumulet_status cumulet_read_aov(cumulet_viewer* viewer, cumulet_aov 
  * [GL] Reads the contribution of one light group to the image, as if there were no other lights. The background counts
  * in the group of the sky or environment and of the sun's disk, unless it is transparent or a color. The sum of all
  * groups is the radiance of cumulet_read_linear, except for rounding and a background color. Rasterized surfaces
- * (CUMULET_SURFACE_LIGHTING_RASTERIZED) count in group 0. Previews have no light groups.
+ * (CUMULET_SURFACE_LIGHTING_RASTERIZED) count in group 0. Previews have no light groups. On a shadow catcher, the
+ * background counts in the group of the sky, and light that objects take away counts as negative in its group.
  *
  * Threads: any thread with the context.
  *

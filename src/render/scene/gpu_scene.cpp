@@ -87,6 +87,16 @@ core::CmShutter shutter_of(const scene::ViewEnds& ends, const std::function<glm:
   return shutter;
 }
 
+// irradiance: of sun and sky on a horizontal plane. Without any, a shadow catcher shows the background, which is black.
+core::CmGround ground_of(const scene::Ground& ground, const glm::vec3& irradiance) {
+  core::CmGround p{ground.albedo, static_cast<float>(ground.height), static_cast<float>(ground.reach), 0};
+  if (!ground.shadow_catcher) return p;
+  for (int i = 0; i < 3; ++i) p.albedo[i] = irradiance[i] > 0.0F ? std::numbers::pi_v<float> / irradiance[i] : 0.0F;
+  p.catches = 1;
+  if (p.albedo == glm::vec3(0.0F)) p.reach = 0.0F;
+  return p;
+}
+
 bool moves(const scene::Volume& volume) { return volume.transform.ends || volume.source->changes(); }
 
 bool is_clipped(const scene::Volume& volume) { return !volume.clip.empty(); }
@@ -696,7 +706,7 @@ PictureParameters GpuScene::parameters(const scene::Snapshot& snapshot, const Tr
   p.lights = table.parameters();
   if (environment_) p.environment = environment_->parameters();
   if (const std::optional<scene::Ground>& ground = *snapshot.ground)
-    p.ground = {ground->albedo, static_cast<float>(ground->height), static_cast<float>(ground->reach)};
+    p.ground = ground_of(*ground, light::level_irradiance(lights(snapshot), sky_surroundings(snapshot)));
   p.integrator = integrator;
   return p;
 }

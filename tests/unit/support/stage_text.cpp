@@ -113,7 +113,7 @@ std::string text_of(const std::optional<scene::ViewEnds>& ends) {
 std::string text_of(const std::optional<scene::Ground>& ground) {
   if (!ground) return "none";
   return "height " + text_of(ground->height) + " albedo " + text_of(dvec3(ground->albedo)) + " reach " +
-         text_of(ground->reach);
+         text_of(ground->reach) + (ground->shadow_catcher ? " shadow catcher" : "");
 }
 
 std::string text_of(const light::DistantLights& lights) {
