@@ -163,7 +163,8 @@ CM_BLOCK(CmLights) {
   CM_ALIGN(16) vec3 sky_radiance;  // for an environment map its mean, which lights the surfaces of previews
   float triangle_probability;
   float analytic_light_probability;  // of all analytic lights together; the sun has the rest
-  float emissive_probability;        // probability that a ray from a surface is aimed at the medium's emission
+  float emissive_probability;        // probability that a ray from a surface or the ground is aimed at the medium's
+                                     // emission
   float cell_probability;            // of emissive cells
   float environment_probability;
   float environment_strength;        // factor on the environment map's radiance

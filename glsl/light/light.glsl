@@ -20,7 +20,7 @@
 #define CM_LIGHT_SUN 1u             // distant: a disk, or without extent
 #define CM_LIGHT_TRIANGLE 2u        // emissive triangles
 #define CM_LIGHT_ANALYTIC_LIGHT 3u  // analytic lights (punctual.glsl)
-#define CM_LIGHT_EMISSIVE 4u        // emission of the medium: rays scattered at surfaces are aimed at its bounds
+#define CM_LIGHT_EMISSIVE 4u        // emission of the medium: rays from surfaces and ground are aimed at its bounds
 #define CM_LIGHT_OTHER 5u           // kinds of CM_MORE_LIGHTS
 #define CM_LIGHT_ENVIRONMENT 6u     // environment map, instead of the sky
 #define CM_LIGHT_CELL 7u            // emissive cells
@@ -301,6 +301,10 @@ CM_FN CmLightSample cm_triangle_sample(CM_INOUT(CmPath) p, vec3 here, vec3 u) {
   return light;
 }
 
+#endif
+
+#if CM_SURFACES || CM_GROUND_AIMS
+
 // ---- Emission of the medium: uniformly sampled points of its bounds
 
 CM_FN vec3 cm_emissive_direction(vec3 o, vec3 u, vec3 otherwise) {
@@ -371,7 +375,7 @@ CM_FN float cm_light_pdf(CmLightHit hit) {
   CM_FAR_LIGHTS(CM_DENSITY)
   CM_NEAR_LIGHTS(CM_DENSITY)
   if (hit.kind == CM_LIGHT_SUN) return cm_sun_probability() * cm_sun_pdf(hit);
-#if CM_SURFACES
+#if CM_SURFACES || CM_GROUND_AIMS
   if (hit.kind == CM_LIGHT_EMISSIVE) return cm.lights.emissive_probability * cm_emissive_pdf(hit);
 #endif
   return 0.0f;

@@ -109,6 +109,27 @@ CM_FN vec3 cm_scattered_direction(CmPath p, float u_0, float u_1) {
                    ground ? sqrt(1.0f - u_0) : cm_medium_cosine(cm_anisotropy(p), u_0), 6.28318531f * u_1);
 }
 
+// Rays that leave the ground or a collision. Some from the ground are aimed at the bounds of the emissive medium, because
+// few others would find a fire.
+CM_FN vec3 cm_scattered_ray(CmPath p, CmDraw draw) {
+  vec3 w = cm_scattered_direction(p, draw.u_direction.x, draw.u_direction.y);
+#if CM_GROUND_AIMS
+  float to_emissive = cm.lights.emissive_probability;
+  if (cm_on_ground(p) && draw.u_choice < to_emissive)
+    w = cm_emissive_direction(p.o, vec3(draw.u_direction.x, draw.u_direction.y, draw.u_choice / to_emissive), w);
+#endif
+  return w;
+}
+// Solid-angle pdf of its direction.
+CM_FN float cm_scattered_ray_pdf(CmPath p, vec3 wi) {
+  float pdf = cm_scattered(p, wi);
+#if CM_GROUND_AIMS
+  if (cm_on_ground(p))
+    pdf = (1.0f - cm.lights.emissive_probability) * pdf + cm_light_pdf(cm_light_hit(CM_LIGHT_EMISSIVE, p.o, wi, pdf));
+#endif
+  return pdf;
+}
+
 CM_FN bool cm_is_equiangular(CmPath p) { return CM_EQUIANGULAR != 0 && p.ray == CM_RAY_EQUIANGULAR; }
 
 // Returns true if the ray's origin is the path's collision, in cell start_cell.
@@ -385,7 +406,7 @@ CM_FN vec3 cm_nee_origin(CmPath p, CmVertex vertex) {
 CM_FN vec3 cm_sample_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
   float u_0 = draw.u_direction.x;
   float u_1 = draw.u_direction.y;
-  if (!vertex.on_triangle) return cm_scattered_direction(p, u_0, u_1);
+  if (!vertex.on_triangle) return cm_scattered_ray(p, draw);
   float u_3 = draw.u_choice;
   float to_emissive = cm.lights.emissive_probability;
   bool aimed = u_3 < to_emissive;
@@ -415,7 +436,7 @@ CM_FN CmScatterSample cm_scatter_sample(CmPath p, CmVertex vertex, vec3 wi) {
 #endif
   } else {
     scatter.lobe_pdf = cm_scattered(p, wi);
-    scatter.pdf = scatter.lobe_pdf;
+    scatter.pdf = cm_scattered_ray_pdf(p, wi);
     scatter.share = vec3(scatter.lobe_pdf);
   }
   scatter.weight = scatter.pdf > 0.0f ? scatter.share / scatter.pdf : vec3(0.0f);
@@ -461,15 +482,19 @@ CM_FN float cm_scattered_end(CmPath p, CmVertex vertex) { return p.event == CM_E
 CM_FN vec3 cm_nee_origin(CmPath p, CmVertex vertex) { return cm_from_cube_point(p.o); }
 
 CM_FN vec3 cm_sample_direction(CM_INOUT(CmPath) p, CmVertex vertex, CmDraw draw) {
-  return cm_scattered_direction(p, draw.u_direction.x, draw.u_direction.y);
+  return cm_scattered_ray(p, draw);
 }
 
 CM_FN CmScatterSample cm_scatter_sample(CmPath p, CmVertex vertex, vec3 wi) {
   CmScatterSample scatter;
-  scatter.pdf = cm_scattered(p, wi);
-  scatter.lobe_pdf = scatter.pdf;
-  scatter.share = vec3(scatter.pdf, scatter.pdf, scatter.pdf);
+  scatter.pdf = cm_scattered_ray_pdf(p, wi);
+  scatter.lobe_pdf = cm_scattered(p, wi);
+  scatter.share = vec3(scatter.lobe_pdf, scatter.lobe_pdf, scatter.lobe_pdf);
+#if CM_GROUND_AIMS
+  scatter.weight = scatter.pdf > 0.0f ? scatter.share / scatter.pdf : vec3(0.0f, 0.0f, 0.0f);
+#else
   scatter.weight = vec3(1.0f, 1.0f, 1.0f);
+#endif
   scatter.lifted = false;
   return scatter;
 }

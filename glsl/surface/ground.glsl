@@ -15,6 +15,9 @@
 #define CM_GROUND 1
 #endif
 
+// CM_GROUND_AIMS 1: some rays from the ground are aimed at the bounds of a medium with emission.
+#define CM_GROUND_AIMS (CM_GROUND && CM_CHANNELS)
+
 // Distance along a ray to the ground, CM_NO_GROUND if the ray misses it. o, d: cube space; d per unit of world
 // distance.
 CM_FN float cm_ground_distance(vec3 o, vec3 d) {

@@ -16,7 +16,7 @@ enum class Kind { sky, sun, triangle, analytic_light, emissive, environment, cel
 
 /// The emission of a medium.
 struct MediumLight {
-  /// If set, a part of the rays scattered at surfaces is aimed at the medium's box.
+  /// If set, a part of the rays scattered at surfaces and on the ground is aimed at the medium's box.
   bool aimed = false;
   /// Luminance per steradian of all cells that NEE may sample; 0: none.
   double power = 0.0;
@@ -44,7 +44,7 @@ class LightTable {
   struct Entry {
     Kind kind = Kind::sky;
     /// Probability of sampling this kind at a vertex. Probabilities sum to 1 unless there is no light. For
-    /// Kind::emissive: the fraction of rays scattered at surfaces that is aimed at the medium.
+    /// Kind::emissive: the fraction of rays scattered at surfaces and on the ground that is aimed at the medium.
     float probability = 0.0F;
   };
 

@@ -488,17 +488,9 @@ TEST_P(EmissionRendering, NextEventEstimationReachesAHotCore) {
 
 // A floor just below a wide emissive slab. Radiance from each direction is the path length in the slab: 8 / cosine, as
 // far as the slab extends.
-TEST_P(EmissionRendering, FireLightsAFloor) {
-  const auto viewer = make();
-  VolumeFrame frame{.density = nothing()};
-  frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
-  show(*viewer, std::move(frame));
-  viewer->set_light({});
-  test::StillScene floor;
-  floor.add_quad({vec3(31, 31, -0.75), vec3(32, 31, -0.75), vec3(32, 32, -0.75), vec3(31, 32, -0.75)},
-                 floor.add(test::diffuse(vec3(0.5F))));
-  viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(floor)));
-  // Half-space integral of 0.5 / pi x cosine x length, over the box -0.5 to 63.5 and 0 to 8 above z = -0.5.
+// Light of a flame with an emission of 1, 64 x 64 x 8 voxels, on a plane of albedo 0.5 a quarter below its large face:
+// the half-space integral of 0.5 / pi x cosine x length.
+double light_below_a_flame() {
   double light = 0.0;
   constexpr int steps = 400;
   for (int i = 0; i < steps; ++i) {
@@ -515,20 +507,53 @@ TEST_P(EmissionRendering, FireLightsAFloor) {
       light += std::max(0.0, leave - enter);
     }
   }
-  light *= 0.5 / (steps * steps);
+  return light * 0.5 / (steps * steps);
+}
+
+void expect_light_below_a_flame(const test::Picture& picture) {
+  const double light = light_below_a_flame();
+  double mean = 0.0;
+  double square = 0.0;
+  for (const glm::vec4& pixel : picture.pixels) {
+    mean += pixel.x / 256.0;
+    square += pixel.x * pixel.x / 256.0;
+  }
+  const double error = std::sqrt((square - mean * mean) / 256.0);
+  EXPECT_NEAR(mean, light, 4.0 * error + 1e-3 * light);
+  EXPECT_LT(error, 0.02 * light);
+}
+
+TEST_P(EmissionRendering, FireLightsAFloor) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field({64, 64, 8}, ivec3(0), 1.0F);
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  test::StillScene floor;
+  floor.add_quad({vec3(31, 31, -0.75), vec3(32, 31, -0.75), vec3(32, 32, -0.75), vec3(31, 32, -0.75)},
+                 floor.add(test::diffuse(vec3(0.5F))));
+  viewer->viewer().show_surfaces(test::source_of(std::make_shared<test::StillScene>(floor)));
   for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2]}) {
     viewer->set_grid(test::settings_of(kind));
     viewer->set_camera(test::camera_at({31.5, 31.5, -0.6}, {31.5, 31.5, -1.0}, 30.0));
-    const test::Picture picture = test::render(*viewer, {16, 16, 256, 1, render::View::shaded});
-    double mean = 0.0;
-    double square = 0.0;
-    for (const glm::vec4& pixel : picture.pixels) {
-      mean += pixel.x / 256.0;
-      square += pixel.x * pixel.x / 256.0;
-    }
-    const double error = std::sqrt((square - mean * mean) / 256.0);
-    EXPECT_NEAR(mean, light, 4.0 * error + 1e-3 * light);
-    EXPECT_LT(error, 0.02 * light);
+    expect_light_below_a_flame(test::render(*viewer, {16, 16, 256, 1, render::View::shaded}));
+  }
+}
+
+// The camera is between the flame and the ground.
+TEST_P(EmissionRendering, FireLightsTheGround) {
+  const auto viewer = make();
+  VolumeFrame frame{.density = nothing()};
+  frame.flame = field({64, 8, 64}, ivec3(0), 1.0F);
+  show(*viewer, std::move(frame));
+  viewer->set_light({});
+  viewer->viewer().set_ground({viewer::GroundMode::at_height, -0.75, vec3(0.5F)});
+  for (const test::MarchKind& kind : {test::march_kinds[0], test::march_kinds[2]}) {
+    viewer->set_grid(test::settings_of(kind));
+    viewer::CameraPose down = test::camera_at({31.5, -0.6, 31.5}, {31.5, -1.0, 31.5}, 30.0);
+    down.up = {0.0, 0.0, -1.0};
+    viewer->set_camera(down);
+    expect_light_below_a_flame(test::render(*viewer, {16, 16, 256, 1, render::View::shaded}));
   }
 }
 
