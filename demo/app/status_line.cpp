@@ -18,11 +18,6 @@ std::string print(const char* format, Values... values) {
   return text.data();
 }
 
-/// Returns true until the image has a sample per pixel.
-bool has_no_samples(const Status& status) {
-  return static_cast<double>(status.stats.samples) < static_cast<double>(status.frame.width) * status.frame.height;
-}
-
 bool has_flag(const Status& status, unsigned flag) { return (status.frame.flags & flag) != 0; }
 
 /// Returns the completed samples per pixel, of all or without a number to reach.
@@ -70,7 +65,7 @@ std::string status_text(const Model& model) {
   // The first samples of an image are shown before they are denoised.
   const bool denoises = view.empty() && model.scene.display.denoise != CUMULET_DENOISE_OFF;
   if (denoises)
-    text += preview || has_no_samples(status) ? "" : ", denoised";
+    text += preview || !has_flag(status, CUMULET_RENDER_DENOISED) ? "" : ", denoised";
   else if (noise)
     text += print(", noise %.2f %%", 100.0 * *noise);
   if (model.navigation.fly != 0) text += "   flying";

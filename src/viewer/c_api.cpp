@@ -594,6 +594,7 @@ cumulet_status cumulet_render(cumulet_viewer* viewer, const cumulet_frame_desc* 
     flag(r.failed, CUMULET_RENDER_FAILED);
     flag(r.preview, CUMULET_RENDER_PREVIEW);
     flag(r.undrawn, CUMULET_RENDER_NEW_IMAGE);
+    flag(r.denoised, CUMULET_RENDER_DENOISED);
     out.progress = r.progress;
     out.width = r.size.x;
     out.height = r.size.y;

@@ -405,6 +405,7 @@ void Context::report(const Shot& shot, const Frame& frame, FrameResult& result) 
                       shown->film().has(render::film_layers::depth), compositor_.denoised()};
     if (drawing) drawn_ = compositor_.lags() ? std::nullopt : std::optional(now);
     result.undrawn = !drawing && drawn_ != now;
+    result.denoised = compositor_.shows_denoised();
   }
   const bool lags = (drawing && compositor_.lags()) || compositor_.denoising();
   const bool pending = host_depth_.pending() || lags;

@@ -41,6 +41,7 @@ struct FrameResult {
   bool failed = false;
   bool preview = false;
   bool undrawn = false;
+  bool denoised = false;
   double progress = 0.0;
   glm::uvec2 size{0U};
   GLuint texture = 0;

@@ -29,8 +29,10 @@ TEST(StatusLine, DescribesTheDisplayedImage) {
   EXPECT_EQ(status_text(model), "42 / 256, noise 1.23 %   100x50");
   model.seconds_left = 35.0;
   model.scene.display.denoise = CUMULET_DENOISE_FAST;
+  EXPECT_EQ(status_text(model), "42 / 256, 0:35 left   100x50") << "the filter is not done";
+  model.status.frame.flags |= CUMULET_RENDER_DENOISED;
   EXPECT_EQ(status_text(model), "42 / 256, 0:35 left, denoised   100x50") << "the noise is not that of the image";
-  model.status.frame.flags = CUMULET_RENDER_CONVERGED;
+  model.status.frame.flags = CUMULET_RENDER_CONVERGED | CUMULET_RENDER_DENOISED;
   EXPECT_EQ(status_text(model), "256 samples, denoised   100x50");
   model.status.frame.flags = CUMULET_RENDER_INCOMPLETE | CUMULET_RENDER_PREVIEW;
   model.seconds_left.reset();

@@ -79,7 +79,10 @@ TEST_F(DenoisedImage, DisplayIsFilteredAndRawReadBackIsNot) {
   display.denoise = CUMULET_DENOISE_FAST;
   ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
   auto frame = target_.frame();
-  cumulet::test::converge(viewer_.get(), frame);
+  const auto is_denoised = [&] {
+    return (cumulet::test::converge(viewer_.get(), frame).flags & CUMULET_RENDER_DENOISED) != 0;
+  };
+  EXPECT_TRUE(is_denoised());
   const std::vector<std::uint8_t> filtered = target_.pixels();
   EXPECT_NE(filtered, raw);
   EXPECT_EQ(linear(), values);
@@ -87,7 +90,7 @@ TEST_F(DenoisedImage, DisplayIsFilteredAndRawReadBackIsNot) {
   EXPECT_LT(off_by(shown(), filtered), 4.0);
   display.denoise = CUMULET_DENOISE_OFF;
   ASSERT_EQ(cumulet_set_display(viewer_.get(), &display), CUMULET_OK);
-  cumulet::test::converge(viewer_.get(), frame);
+  EXPECT_FALSE(is_denoised());
   EXPECT_EQ(target_.pixels(), raw);
 }
 
@@ -118,7 +121,9 @@ TEST_F(DenoisedImage, FramesWithoutATargetFilterToo) {
   EXPECT_TRUE(is_news());
   auto drawn = target_.frame();
   drawn.budget_ms = -1.0;
-  ASSERT_EQ(cumulet_render(viewer_.get(), &drawn, nullptr), CUMULET_OK) << error();
+  auto result = make_desc<cumulet_frame_result>();
+  ASSERT_EQ(cumulet_render(viewer_.get(), &drawn, &result), CUMULET_OK) << error();
+  EXPECT_NE(result.flags & CUMULET_RENDER_DENOISED, 0U);
   const std::vector<std::uint8_t> filtered = target_.pixels();
   EXPECT_NE(filtered, raw);
   EXPECT_FALSE(is_news());

@@ -3719,7 +3719,12 @@ enum {
    * After a frame with CUMULET_TARGET_NONE: there is a newer image than the one drawn last. If it is not set, drawing
    * again gives the same image unless display settings changed.
    */
-  CUMULET_RENDER_NEW_IMAGE = 32
+  CUMULET_RENDER_NEW_IMAGE = 32,
+  /**
+   * The image that was drawn last is denoised, see cumulet_display_desc.denoise. Not set while the first samples of an
+   * image are shown before the filter is done.
+   */
+  CUMULET_RENDER_DENOISED = 64
 };
 
 /** The result of a frame. */

@@ -115,7 +115,8 @@ enum class RenderFlags : std::uint32_t {
   loading = CUMULET_RENDER_LOADING,
   failed = CUMULET_RENDER_FAILED,
   preview = CUMULET_RENDER_PREVIEW,
-  new_image = CUMULET_RENDER_NEW_IMAGE
+  new_image = CUMULET_RENDER_NEW_IMAGE,
+  denoised = CUMULET_RENDER_DENOISED
 };
 
 [[nodiscard]] constexpr Modifiers operator|(Modifiers a, Modifiers b) noexcept {

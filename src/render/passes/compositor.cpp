@@ -161,6 +161,7 @@ Compositor::Means* Compositor::means_to_draw(const PictureTextures& picture, Bac
                                              const Display& display, const FrameTarget& target) {
   lags_ = false;
   Means* const means = go_on_filtering(picture, background, display, target);
+  shows_denoised_ = means != nullptr;
   return means != nullptr ? means : resolve(picture, background, target.wait);
 }
 

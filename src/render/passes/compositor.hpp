@@ -61,6 +61,8 @@ class Compositor {
   [[nodiscard]] bool lags() const { return lags_; }
   /// True if a picture that has all its samples is not denoised yet.
   [[nodiscard]] bool denoising() const { return denoising_; }
+  /// True if the last draw() showed a denoised picture.
+  [[nodiscard]] bool shows_denoised() const { return shows_denoised_; }
   /// Revision number; changes with every denoised picture, so that draw() would draw another image.
   [[nodiscard]] std::uint64_t denoised() const { return denoised_; }
   /// Rows that the last draw() composed; nullopt if it drew the whole image directly into the target.
@@ -169,6 +171,7 @@ class Compositor {
   double draw_ms_ = 0.0;          // smoothed time of the rest of draw()
   bool lags_ = false;
   bool denoising_ = false;
+  bool shows_denoised_ = false;
   std::uint64_t denoised_ = 0;
   Clock::time_point resolved_{};
 };
