@@ -130,10 +130,11 @@ def test_sky_and_ground(s):
     there = ["frames 3", "wait loaded", "frames 2"]
     tell = lambda name: [*there, f'report "{name}.json"']
     s.play("replay", [*SETTLE, *shot("day"), *shown("Sun & sky"), drag("Haze", 0.95), *SETTLE, *shot("haze"), *choose("Sky", "Constant"), *SETTLE,
-                      *shot("constant"), "key ctrl+z", *tell("hazy"), "key ctrl+z", *SETTLE, *shot("undone"),
+                      *shot("constant"), "key ctrl+z", *tell("hazy"), "key ctrl+z",
+                      "move viewport 0.5 0.5", *SETTLE, *shot("undone"),
                       "key ctrl+shift+z", "key ctrl+shift+z", *tell("redone"), *choose("Sky", "Physical"), *tell("physical"),
-                      *shown("Ground"), *choose("Ground", "At a height"), *SETTLE, *shot("at_0"), drag("Ground height", 0.4), *tell("lower"),
-                      "key ctrl+z", *SETTLE, *shot("raised"), *choose("Ground", "None"), *SETTLE, *shot("none"), "key ctrl+z",
+                      *shown("Ground"), *choose("Ground", "At a height"), "move viewport 0.5 0.5", *SETTLE, *shot("at_0"),
+                      drag("Ground height", 0.4), *tell("lower"), "key ctrl+z", "move viewport 0.5 0.5", *SETTLE, *shot("raised"), *choose("Ground", "None"), *SETTLE, *shot("none"), "key ctrl+z",
                       *tell("there"), "key ctrl+shift+z", *tell("gone")],
            "--volume", s.cumulus, "--spp", "4")
     day, report, area = look(s, "day")
