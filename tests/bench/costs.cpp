@@ -156,8 +156,7 @@ scene::ModelSourcePtr emitter_at(const Position& position, double side, float ra
 
 // Disables the emission that scattered rays accumulate along their path, and adds it only at collisions (emission
 // divided by extinction).
-constexpr Edit no_way = {"path/free_flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, p.t_end));\n",
-                         ""};
+constexpr Edit no_way = {"path/free_flight.glsl", "      emitted += cm_emitted(emission, p.t, min(t_1, t_end));\n", ""};
 constexpr Edit where_they_collide = {"path/free_flight.glsl",
                                      "    emitted += cm_emitted(emission, p.t, p.t + min(way, left));\n",
                                      "    float there = max(0.0f, emission.at_0 + emission.slope * (p.t + way));\n"
