@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <file.hpp>
 #include <filesystem>
-#include <functional>
 #include <headless.hpp>
 #include <image.hpp>
 #include <iostream>
@@ -19,7 +18,6 @@
 #include <program.hpp>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <timeline.hpp>
 #include <utility>
 #include <vector>
@@ -49,19 +47,22 @@
 #include "stats.hpp"
 #include "time_limit.hpp"
 #include "tiny_objects.hpp"
+#include "tracing.hpp"
 #include "transforms.hpp"
 #include "up_axis.hpp"
 
 namespace {
 
 using cumulet::demo::check;
+using cumulet::demo::check_not_interrupted;
 using cumulet::demo::Checkpoint;
-using cumulet::demo::driver_of;
 using cumulet::demo::EarlyPictures;
 using cumulet::demo::FireLook;
 using cumulet::demo::fits;
+using cumulet::demo::forget_checkpoint;
 using cumulet::demo::FramePlan;
 using cumulet::demo::FrameState;
+using cumulet::demo::interrupted;
 using cumulet::demo::one_line;
 using cumulet::demo::OutputFormat;
 using cumulet::demo::PlannedFrame;
@@ -71,30 +72,12 @@ using cumulet::demo::RenderOptions;
 using cumulet::demo::SceneOptions;
 using cumulet::demo::stats_of;
 using cumulet::demo::Timeline;
+using cumulet::demo::Traced;
 using cumulet::demo::Viewer;
 using cumulet::demo::volume_of;
+using cumulet::demo::wait;
 using cumulet::headless::Backend;
 using cumulet::headless::Context;
-
-// A signal handler can only access globals.
-volatile std::sig_atomic_t interrupted = 0;
-
-extern "C" void on_signal(int) { interrupted = 1; }
-
-/// The first Ctrl-C requests an orderly end, the second kills the process.
-void catch_signals() {
-  struct sigaction action {};
-  action.sa_handler = on_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-  for (const int signal : {SIGINT, SIGTERM}) {
-    struct sigaction old {};
-    // A background job of a shell, or nohup, ignores the signal; keep it ignored.
-    if (sigaction(signal, nullptr, &old) == 0 && old.sa_handler == SIG_IGN) continue;
-    sigaction(signal, &action, nullptr);
-  }
-  // With SIGXFSZ ignored, exceeding the file size limit is a write error with a cause, and does not kill the process.
-  std::signal(SIGXFSZ, SIG_IGN);
-}
 
 Backend backend_of(cumulet::demo::BackendChoice choice) {
   switch (choice) {
@@ -106,70 +89,6 @@ Backend backend_of(cumulet::demo::BackendChoice choice) {
       break;
   }
   return Backend::automatic;
-}
-
-void check_not_interrupted() {
-  if (interrupted) throw std::runtime_error("interrupted before the first sample: no file is written");
-}
-
-/// Waits until the library's worker thread is done. Throws its error.
-void wait(const Viewer& viewer, Progress& progress) {
-  cumulet_progress state{};
-  state.struct_size = sizeof state;
-  for (;;) {
-    const cumulet_status status = cumulet_wait(viewer.get(), 100.0);
-    if (status != CUMULET_ERROR_TIMEOUT) return check(viewer, status);
-    if (interrupted) {
-      cumulet_cancel(viewer.get());
-      check_not_interrupted();
-    }
-    cumulet_get_progress(viewer.get(), &state);
-    if (state.stage > CUMULET_STAGE_LOADING) progress.stage("building the grid");
-  }
-}
-
-constexpr double draw_only_ms = -1.0;  // budget of a frame that traces no samples
-constexpr double budget_ms = 200.0;    // interval of progress updates, and the maximum delay of Ctrl-C
-
-cumulet_frame_desc frame_of(const RenderOptions& options) {
-  cumulet_frame_desc frame{};
-  frame.struct_size = sizeof frame;
-  frame.target = CUMULET_TARGET_NONE;
-  frame.width = options.scene.width;
-  frame.height = options.scene.height;
-  frame.budget_ms = budget_ms;
-  return frame;
-}
-
-void check_frame(const Viewer& viewer, const RenderOptions& options, cumulet_status status) {
-  if (status == CUMULET_ERROR_OUT_OF_MEMORY) {
-    throw std::runtime_error(cumulet::demo::needs_text(options) + ": " + cumulet_last_error(viewer.get()));
-  }
-  check(viewer, status);
-}
-
-cumulet_frame_result render_frame(const Viewer& viewer, const RenderOptions& options, double within_ms) {
-  cumulet_frame_desc frame = frame_of(options);
-  frame.budget_ms = within_ms;
-  cumulet_frame_result result{};
-  result.struct_size = sizeof result;
-  check_frame(viewer, options, cumulet_render(viewer.get(), &frame, &result));
-  return result;
-}
-
-/// Compiles shaders and builds grids before the first sample, so that the samples' times contain nothing else.
-void warm_up(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
-  const cumulet_frame_desc frame = frame_of(options);
-  cumulet_warm_up_result result{};
-  result.struct_size = sizeof result;
-  do {
-    progress.stage("compiling shaders", result.progress);
-    check_frame(viewer, options, cumulet_warm_up(viewer.get(), &frame, CUMULET_WARM_UP_SCENE, &result));
-    // A camera-adaptive grid is built when the image size is known.
-    if (result.incomplete != 0) wait(viewer, progress);
-    check_not_interrupted();
-  } while (result.incomplete != 0);
-  progress.stage("compiling shaders", 1.0);
 }
 
 /// Returns the settings of the loaded surfaces: checks the animation and resolves the name of the material variant.
@@ -195,85 +114,7 @@ void check_memory(const Viewer& viewer, const RenderOptions& options) {
   cumulet::demo::check_memory(options, stats_of(viewer).gl_renderer, cumulet::demo::available_memory());
 }
 
-enum class Traced { converged, late, stopped };
-
 using Clock = std::chrono::steady_clock;
-
-/// Writes the accumulated samples to the checkpoint file.
-void keep(const Viewer& viewer, const RenderOptions& options) {
-  cumulet::demo::Checkpoint checkpoint{cumulet::demo::checkpoint_of(options), driver_of(viewer), {}};
-  std::size_t size = 0;
-  check(viewer, cumulet_read_accumulation(viewer.get(), nullptr, &size));
-  checkpoint.accumulation.resize(size);
-  check(viewer, cumulet_read_accumulation(viewer.get(), checkpoint.accumulation.data(), &size));
-  cumulet::demo::write_checkpoint(options.checkpoint, checkpoint);
-}
-
-/// Deletes the checkpoint of an image that has been written.
-void forget_checkpoint(const std::string& file) {
-  std::error_code ignored;  // a leftover file does no harm
-  if (!file.empty()) std::filesystem::remove(file, ignored);
-}
-
-/// Writes a checkpoint. A failure is logged and rendering continues, because the disk may have space the next time.
-void try_to_keep(const Viewer& viewer, const RenderOptions& options, Progress& progress) {
-  try {
-    keep(viewer, options);
-  } catch (const std::exception& error) {
-    print_line(progress, std::string("warning: the checkpoint was not written: ") + error.what());
-  }
-}
-
-/// Starts the image with the samples of the checkpoint.
-void resume(const Viewer& viewer, const RenderOptions& options, const Checkpoint& from, Progress& progress) {
-  constexpr double min_ms = 1.0;
-  cumulet_frame_result frame{};
-  while (frame.width == 0 && !(frame.progress > 0.0)) {
-    check_not_interrupted();
-    frame = render_frame(viewer, options, min_ms);
-    if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
-  }
-  if (cumulet_restore_accumulation(viewer.get(), from.accumulation.data(), from.accumulation.size()) != CUMULET_OK)
-    throw std::runtime_error(options.checkpoint + ": " + cumulet_last_error(viewer.get()));
-  const std::string driver = driver_of(viewer);
-  print_line(progress,
-             options.output + ": resuming from " + options.checkpoint +
-                 (driver == from.driver ? ""
-                                        : ", made with another driver (" + from.driver +
-                                              "); the result will not be bit-identical to an uninterrupted render"));
-}
-
-/// Renders until the image has all samples, the time limit is reached, or a signal interrupts it. whole: called after
-/// each frame that leaves every pixel with a sample.
-Traced trace(const Viewer& viewer, const RenderOptions& options, const std::optional<Checkpoint>& from,
-             Progress& progress, const std::function<void()>& whole) {
-  if (from) resume(viewer, options, *from, progress);
-  const cumulet::demo::TimeLimit limit(options.time_limit);
-  cumulet_frame_result frame{};
-  bool began = from.has_value();
-  auto kept = Clock::now();
-  while (!interrupted && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) {
-    // The time limit does not apply until each pixel has a sample.
-    if (frame.width > 0 && limit.reached()) return Traced::late;
-    frame = render_frame(viewer, options, limit.budget(budget_ms));
-    if ((frame.flags & CUMULET_RENDER_LOADING) != 0) wait(viewer, progress);
-    if (frame.width > 0 || frame.progress > 0.0) {
-      began = true;
-      progress.render(cumulet::demo::part_done(frame.progress, limit.over(), options.time_limit),
-                      static_cast<double>(stats_of(viewer).samples));
-    }
-    if (frame.width > 0 && (frame.flags & CUMULET_RENDER_CONVERGED) == 0) whole();
-    const double since = std::chrono::duration<double>(Clock::now() - kept).count();
-    if (!options.checkpoint.empty() && began && since >= options.checkpoint_every) {
-      try_to_keep(viewer, options, progress);
-      kept = Clock::now();
-    }
-  }
-  if (!began) check_not_interrupted();
-  if ((frame.flags & CUMULET_RENDER_CONVERGED) != 0) return Traced::converged;
-  if (!options.checkpoint.empty()) keep(viewer, options);
-  return Traced::stopped;
-}
 
 void print_ending(const RenderOptions& options, Traced traced, double measured, double samples, double seconds,
                   Progress& progress) {
@@ -370,9 +211,9 @@ class Studio {
 
   /// Renders all samples, resuming from a checkpoint if there is one.
   Traced trace(const RenderOptions& options, const std::optional<Checkpoint>& from, EarlyPictures early) {
-    warm_up(viewer_, options, progress_);
+    cumulet::demo::warm_up(viewer_, options, progress_);
     const auto start = Clock::now();
-    const Traced traced = ::trace(viewer_, options, from, progress_, [&] {
+    const Traced traced = cumulet::demo::trace(viewer_, options, from, progress_, [&] {
       if (!early.due(seconds())) return;
       write_early(options);
       early.written(seconds());
@@ -405,7 +246,7 @@ class Studio {
   }
 
   /// Writes a checkpoint, so that another run can continue after the time limit.
-  void keep_samples(const RenderOptions& options) { try_to_keep(viewer_, options, progress_); }
+  void keep_samples(const RenderOptions& options) { cumulet::demo::try_to_keep(viewer_, options, progress_); }
 
   /// Logs the result of the written image. always: even without a noise target or time limit. Throws if rendering was
   /// interrupted.
@@ -598,14 +439,6 @@ class Studio {
   cumulet::demo::Models models_;
 };
 
-/// Reads the checkpoint to resume from, if there is one. Throws if it belongs to another image or if the file cannot be
-/// written.
-std::optional<Checkpoint> checkpoint_for(const RenderOptions& options) {
-  if (options.checkpoint.empty()) return std::nullopt;
-  cumulet::image::check_writable(options.checkpoint);
-  return cumulet::demo::read_checkpoint(options.checkpoint, cumulet::demo::checkpoint_of(options));
-}
-
 /// Returns when images are written before the end. Beside other files, the image says that they are complete.
 EarlyPictures early_pictures(const RenderOptions& options) {
   constexpr double first_seconds = 10.0;
@@ -616,7 +449,7 @@ EarlyPictures early_pictures(const RenderOptions& options) {
 /// Places the camera if the scene has none.
 void place_camera(const Viewer& viewer, const RenderOptions& options) {
   if (!fits(options.scene.camera) || options.scene.surface_camera >= 0) return;
-  static_cast<void>(render_frame(viewer, options, draw_only_ms));  // the library places it
+  cumulet::demo::draw_without_samples(viewer, options);  // the library places it
   cumulet::demo::turn_to_first_view(viewer.get());
 }
 
@@ -624,8 +457,8 @@ void render(RenderOptions options) {
   cumulet::image::check_writable(options.output);
   if (!options.stats.empty()) cumulet::image::check_writable(options.stats);
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
-  const std::optional<Checkpoint> from = checkpoint_for(options);
-  catch_signals();
+  const std::optional<Checkpoint> from = cumulet::demo::checkpoint_for(options);
+  cumulet::demo::catch_signals();
   Studio studio(options);
   studio.load(options.scene);
   studio.remark(options.scene);
@@ -724,12 +557,12 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
   const auto start = Clock::now();
   Traced traced = Traced::stopped;
   try {
-    const std::optional<Checkpoint> from = checkpoint_for(picture);
+    const std::optional<Checkpoint> from = cumulet::demo::checkpoint_for(picture);
     studio.load(picture.scene, &frame);
     traced = studio.trace(picture, from, EarlyPictures(std::nullopt));
     if (frame.next && picture.scene.is_shown() && traced != Traced::stopped) studio.require_drawn(*frame.next);
   } catch (const std::runtime_error& error) {
-    if (interrupted) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));
+    if (interrupted()) throw std::runtime_error(std::string(error.what()) + ": " + report.not_made(index));
     return report.say(index, FrameState::failed, error.what(), &studio.progress());
   }
   // Nothing is written: the next run would keep the incomplete image.
@@ -752,7 +585,7 @@ void render_frame_of(Studio& studio, const RenderOptions& picture, const Planned
 /// error ends the run, because the next frames would fail too.
 void render_frames(RenderOptions options, const FramePlan& plan) {
   if (!options.trace.empty()) cumulet::image::check_writable(options.trace);
-  catch_signals();
+  cumulet::demo::catch_signals();
   std::signal(SIGPIPE, SIG_IGN);  // rendering continues if the reader of the status lines exits
   if (!plan.passed_over.empty()) std::fprintf(stderr, "warning: %s\n", one_line(plan.passed_over).c_str());
   std::unique_ptr<Studio> studio;
