@@ -1,14 +1,9 @@
 #include "fire_look.hpp"
 
 #include <array>
-#include <cmath>
-#include <cstddef>
 #include <cstdio>
 #include <default_look.hpp>
-#include <suitable_exposure.hpp>
 #include <utility>
-
-#include "aovs.hpp"
 
 namespace cumulet::demo {
 namespace {
@@ -16,11 +11,6 @@ namespace {
 void set_display(const Viewer& viewer, cumulet_display_desc display) {
   display.denoise = CUMULET_DENOISE_OFF;  // the program denoises pixels after it has read them
   check(viewer, cumulet_set_display(viewer.get(), &display));
-}
-
-bool is_whole(const SceneOptions& scene) {
-  const image::Windows windows = windows_of(scene.sampling.region, scene.width, scene.height);
-  return windows.width == scene.width && windows.height == scene.height;
 }
 
 }  // namespace
@@ -56,26 +46,10 @@ void FireLook::take(const Viewer& viewer, const SceneOptions& scene) {
   dusk_ = std::move(dusk);
 }
 
-void FireLook::settle(SceneOptions& scene) {
-  has_one_image_ = false;
+void FireLook::settle(SceneOptions& scene) const {
   if (!dusk_) return;
   scene.light = dusk_->light;
   scene.display = dusk_->display;
-}
-
-void FireLook::expose(const Viewer& viewer, const RenderOptions& options, const std::vector<float>& denoised) {
-  // All regions of an image have the same exposure.
-  if (!dusk_ || !has_one_image_ || options.format != OutputFormat::png || !is_whole(options.scene)) return;
-  std::vector<float> read;
-  if (denoised.empty()) {
-    read.resize(std::size_t{4} * options.scene.width * options.scene.height);
-    check(viewer, cumulet_read_linear(viewer.get(), read.data(), read.size()));
-  }
-  const auto stops = image::suitable_exposure(denoised.empty() ? read : denoised, options.scene.width,
-                                              options.scene.height, image::Curve::filmic);
-  const bool is_close = !stops || std::abs(*stops - dusk_exposure) < exposure_tolerance;
-  dusk_->display.exposure_stops = is_close ? dusk_exposure : *stops;
-  set_display(viewer, dusk_->display);
 }
 
 void FireLook::print_light(Progress& progress) const {
@@ -84,16 +58,8 @@ void FireLook::print_light(Progress& progress) const {
   std::snprintf(line.data(), line.size(),
                 "the volume burns: using dusk light, --tone-map filmic and --exposure %g (set any option of light, "
                 "tone map or exposure to disable this; --tone-map neutral keeps the daylight)",
-                double{dusk_->display.exposure_stops});
+                double{dusk_exposure});
   print_line(progress, line.data());
-}
-
-void FireLook::print_exposure(const std::string& output, Progress& progress) const {
-  if (!dusk_ || dusk_->display.exposure_stops == dusk_exposure) return;
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), ": exposure %+.1f stops suits the image (--exposure)",
-                double{dusk_->display.exposure_stops});
-  print_line(progress, output + text.data());
 }
 
 RenderOptions FireLook::shown(RenderOptions options) const {

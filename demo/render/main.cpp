@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "aovs.hpp"
+#include "auto_exposure.hpp"
 #include "checkpoint.hpp"
 #include "cube_lut.hpp"
 #include "default_medium.hpp"
@@ -53,6 +54,7 @@
 
 namespace {
 
+using cumulet::demo::AutoExposure;
 using cumulet::demo::check;
 using cumulet::demo::check_not_interrupted;
 using cumulet::demo::Checkpoint;
@@ -144,6 +146,7 @@ class Studio {
  public:
   explicit Studio(const RenderOptions& options)
       : fire_look_(options.default_look),
+        exposure_(options),
         denoiser_(denoiser_of(options, progress_)),
         context_(
             (progress_.stage("loading " + first_file(options.scene)), Context::create(backend_of(options.backend)))),
@@ -155,7 +158,8 @@ class Studio {
 
   [[nodiscard]] Progress& progress() { return progress_; }
   [[nodiscard]] const Viewer& viewer() const { return viewer_; }
-  [[nodiscard]] FireLook& fire_look() { return fire_look_; }
+  [[nodiscard]] const FireLook& fire_look() const { return fire_look_; }
+  [[nodiscard]] AutoExposure& exposure() { return exposure_; }
   [[nodiscard]] double seconds() const { return seconds_since(start_); }
 
   /// Loads the scene's volume and everything else, and waits for it. frame: the frame of a sequence, or null. Throws
@@ -242,7 +246,7 @@ class Studio {
       cumulet::demo::write_stats(options, viewer_, context_.name());
     }
     write_exposed(options, denoised);
-    fire_look_.print_exposure(options.output, progress_);
+    exposure_.print(options.output, progress_);
   }
 
   /// Writes a checkpoint, so that another run can continue after the time limit.
@@ -279,8 +283,9 @@ class Studio {
   }
 
   void write_exposed(const RenderOptions& options, const std::vector<float>& denoised) {
-    fire_look_.expose(viewer_, options, denoised);
-    cumulet::demo::write_picture(viewer_, fire_look_.shown(options), others_, denoised, progress_);
+    const RenderOptions lit = fire_look_.shown(options);
+    exposure_.measure(viewer_, lit.scene, lit.scene.display, denoised);
+    cumulet::demo::write_picture(viewer_, exposure_.shown(lit), others_, denoised, progress_);
   }
 
   /// Writes the image so far. A failure is logged, because the disk may have space at the end.
@@ -426,6 +431,7 @@ class Studio {
 
   Progress progress_;
   FireLook fire_look_;
+  AutoExposure exposure_;
   Clock::time_point start_ = Clock::now();
   double traced_seconds_ = 0.0;
   cumulet::demo::Messages messages_{progress_};
@@ -527,6 +533,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   const bool known = kept && cumulet::demo::read_settled(options, plan.analyzed_by);
   if (kept && !known) cumulet::image::check_writable(options.sequence_cache);
   auto studio = std::make_unique<Studio>(options);
+  studio->exposure().keep();
   wait(studio->viewer(), studio->progress());
   studio->choose_in_surfaces(options);
   if (known || is_settled(options.scene)) return studio;

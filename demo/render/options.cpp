@@ -773,10 +773,12 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   if (!options.lut.empty()) ocio = {};
   if (options.lut.empty() && app.count("--lut-input") > 0) throw UsageError("--lut-input needs --lut");
   options.denoises_by_default = app.count("--denoise") == 0;
-  options.gives_up = app.count("--up") > 0;
+  options.given.up = app.count("--up") > 0;
   // A given camera is made for the file's own axes.
-  options.default_up = !options.gives_up && app.count("--camera") + app.count("--scene") == 0 && !lit;
+  options.default_up = !options.given.up && app.count("--camera") + app.count("--scene") == 0 && !lit;
   options.default_look = std::ranges::all_of(look_flags, [&](const char* flag) { return app.count(flag) == 0; });
+  options.given.exposure =
+      lit || app.count("--scene") + app.count("--exposure") > 0 || !options.lut.empty() || !ocio.config.empty();
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);
   check_together(options, part);
   // Like every scene setting, it changes the scene hash in the file.

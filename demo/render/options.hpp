@@ -44,6 +44,12 @@ enum class OutputFormat { png, exr, pfm };
 enum class Denoise { off, fast, high };
 enum class BackendChoice { automatic, egl, osmesa };
 
+/// Settings that are given and have no default value then.
+struct Given {
+  bool exposure = false;  // by a flag, a scene file, or a view that has its own
+  bool up = false;        // --up
+};
+
 struct RenderOptions {
   SceneOptions scene;
   BackendChoice backend = BackendChoice::automatic;
@@ -73,8 +79,8 @@ struct RenderOptions {
   std::optional<std::uint32_t> thumbnail;  // pixels per side
   std::string lut;                         // a .cube file; empty: none
   cumulet_lut_shaper lut_shaper = CUMULET_LUT_SHAPER_SRGB;
+  Given given;
   bool default_look = true;  // no flag sets light, exposure or tone map
-  bool gives_up = false;     // --up is given
   bool default_up = true;    // the metadata of the volume names its up axis
 
   [[nodiscard]] bool has_layers() const { return !aovs.empty() || cryptomatte; }

@@ -14,7 +14,7 @@ void print(const std::string& line) { std::fprintf(stderr, "%s\n", one_line(line
 }  // namespace
 
 void choose_up_axis(RenderOptions& options, const std::optional<FramePlan>& plan) {
-  if (options.info || options.gives_up) return;
+  if (options.info || options.given.up) return;
   SceneOptions& scene = options.scene;
   const std::vector<std::string> files = plan ? plan->analyzed_by : std::vector{scene.volume};
   if (options.default_up && scene.is_shown() && known_up_axis(files) == UpAxis::z) {

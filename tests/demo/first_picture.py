@@ -1,9 +1,11 @@
 """The first image of cumulet-render with default settings. A cloud is neither black nor overexposed, at any density. An
-explosion shows flames in dark smoke at dusk, also as the frames of a sequence.
+explosion shows flames in dark smoke at dusk, also as the frames of a sequence. Gray smoke is exposed for what it shows,
+unless a flag or a scene file sets the exposure.
 
 Usage: first_picture.py RENDER CLOUD EXPLOSION OUT_FOLDER
 """
 
+import json
 import pathlib
 import shutil
 import subprocess
@@ -39,6 +41,29 @@ def sequence(render, explosion, out):
                                str(cache), *given, "-o", f"{out}/again_#.png"], check=True, timeout=180, stderr=subprocess.PIPE, text=True)
         rows = Picture(out / "again_2.png").rows
         assert (rows == second) == (not given), (given, done.stderr)
+
+
+def smoke(render, explosion, out):
+    """Smoke is darker than a cloud in the same light. Its .png gets the exposure that suits it."""
+    scene = out / "smoke.json"
+    scene.write_text(json.dumps({"cumulet_scene": 3, "volumes": [{"file": str(pathlib.Path(explosion).resolve())}]}))
+
+    def shown(name, source, *more):
+        """Returns the mean luminance of a .png, and whether a line says that its exposure was measured."""
+        file = out / name
+        done = subprocess.run([render, *source, "--flame-grid", "none", "--temperature-grid", "none", "--ground", "none", "--size", "64x40",
+                               "--spp", "16", "-o", str(file), *more], check=True, timeout=180, stderr=subprocess.PIPE, text=True)
+        values = luminances(Picture(file)) if file.suffix == ".png" else [0.0]
+        return sum(values) / len(values), "stops suits the image" in done.stderr
+
+    bright, measured = shown("smoke.png", [explosion])
+    plain, kept = shown("smoke_plain.png", [explosion], "--exposure", "0")
+    print(f"smoke: mean {bright:.3f}, at exposure 0 {plain:.3f}")
+    assert measured and 0.35 < bright < 0.7 and bright > plain + 0.08, (measured, bright, plain)
+    assert not kept
+    assert not shown("smoke_scene.png", ["--scene", scene])[1], "a scene file sets the exposure, also by leaving it out"
+    assert not shown("smoke.exr", [explosion])[1], "linear radiance has no exposure"
+    assert not shown("smoke_part.png", [explosion], "--region", "0,0,0.5,1")[1], "all regions of an image have one exposure"
 
 
 def main():
@@ -89,6 +114,7 @@ def main():
         assert "dusk" not in messages and blue(day) > blue(pixels) + 20, (given, blue(day), blue(pixels), messages)
     assert "dusk" in fire("linear", ending="exr")[1], "linear radiance has the light too"
     sequence(render, explosion, out)
+    smoke(render, explosion, out)
 
 
 main()

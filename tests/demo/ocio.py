@@ -33,7 +33,7 @@ def main():
     config.write_text(CONFIG)
 
     def run(name, *flags):
-        return subprocess.run([render, volume, "--size", "64x40", "--spp", "4", "--denoise", "off", "-o",
+        return subprocess.run([render, volume, "--size", "64x40", "--spp", "4", "--denoise", "off", "--exposure", "0", "-o",
                                f"{out}/{name}.png", *flags], timeout=90, capture_output=True, text=True)
 
     def refused(*flags):
