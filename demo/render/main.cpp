@@ -178,7 +178,10 @@ class Studio {
       }
     }
     wait(viewer_, progress_);
-    if (frame != nullptr) others_.go_to(frame->seconds);
+    if (frame != nullptr) {
+      others_.go_to(frame->seconds);
+      choose_in_surfaces(scene);
+    }
     open_others(scene);
     open_models(scene);
     look_ = cumulet::demo::default_medium(viewer_, scene);
@@ -199,15 +202,12 @@ class Studio {
     for (const std::string& line : cumulet::demo::remarks_on_tiny(boxes)) print_line(progress_, line);
   }
 
-  /// Applies the settings that need the loaded surfaces: material variant and camera.
-  void choose_in_surfaces(const RenderOptions& options) {
-    const auto& scene = options.scene;
+  /// Applies the settings that need the loaded surfaces: time, material variant and camera.
+  void choose_in_surfaces(const SceneOptions& scene) {
     if (!scene.surfaces.empty()) {
       const cumulet_surface_settings_desc settings = surface_settings(viewer_, scene);
-      if (settings.variant != 0) {
-        check(viewer_, cumulet_set_surface_settings(viewer_.get(), &settings));
-        wait(viewer_, progress_);
-      }
+      check(viewer_, cumulet_set_surface_settings(viewer_.get(), &settings));
+      wait(viewer_, progress_);
     }
     if (scene.surface_camera >= 0)
       check(viewer_, cumulet_use_surface_camera(viewer_.get(), static_cast<std::uint32_t>(scene.surface_camera)));
@@ -468,7 +468,7 @@ void render(RenderOptions options) {
   Studio studio(options);
   studio.load(options.scene);
   studio.remark(options.scene);
-  studio.choose_in_surfaces(options);
+  studio.choose_in_surfaces(options.scene);
   place_camera(studio.viewer(), options);
   if (options.whole_seconds)
     options.time_limit = cumulet::demo::sampling_seconds(*options.whole_seconds, studio.seconds());
@@ -535,7 +535,7 @@ std::unique_ptr<Studio> open_studio(RenderOptions& options, const FramePlan& pla
   auto studio = std::make_unique<Studio>(options);
   studio->exposure().keep();
   wait(studio->viewer(), studio->progress());
-  studio->choose_in_surfaces(options);
+  studio->choose_in_surfaces(options.scene);
   if (known || is_settled(options.scene)) return studio;
   for (const std::string& volume : plan.analyzed_by) {
     SceneOptions probe = options.scene;
@@ -615,6 +615,7 @@ void render_frames(RenderOptions options, const FramePlan& plan) {
     picture.stats = frame.stats;
     picture.checkpoint = frame.checkpoint;
     if (frame.next) picture.scene.sequence.frame = frame.number;  // its files do not identify the frame
+    if (!options.given.time) cumulet::demo::set_animation_time(picture.scene, frame.seconds);
     render_frame_of(*studio, picture, frame, report, i);
   }
   if (studio) studio->write_trace(options);

@@ -726,6 +726,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       "Ctrl-C writes the samples so far and exits with 1; a second Ctrl-C stops at once.\n"
       "Without --stats, --trace and --checkpoint, a .png is first written after 10 s, and then improves.\n"
       "For a sequence, one line per frame is printed: frame 12 (3 of 20) done|kept|failed FILE...\n"
+      "Animations of models follow the clock of the sequence, unless --gltf-time is given.\n"
       "Frames that cannot be read fail, and the others are rendered; the exit status is then 1.\n"
       "Ctrl-C does not write the current frame of a sequence.");
   // Added before the flags, which override the scene.
@@ -777,6 +778,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
   // A given camera is made for the file's own axes.
   options.default_up = !options.given.up && app.count("--camera") + app.count("--scene") == 0 && !lit;
   options.default_look = std::ranges::all_of(look_flags, [&](const char* flag) { return app.count(flag) == 0; });
+  options.given.time = app.count("--gltf-time") > 0;
   options.given.exposure =
       lit || app.count("--scene") + app.count("--exposure") > 0 || !options.lut.empty() || !ocio.config.empty();
   if (options.denoises_by_default && !part) options.denoise = default_denoise(options, lit || app.count("--scene") > 0);

@@ -47,6 +47,7 @@ enum class BackendChoice { automatic, egl, osmesa };
 /// Settings that are given and have no default value then.
 struct Given {
   bool exposure = false;  // by a flag, a scene file, or a view that has its own
+  bool time = false;      // --gltf-time, for all frames of a sequence
   bool up = false;        // --up
 };
 

@@ -4,6 +4,7 @@ killed.
 Usage: sequence.py RENDER SCENE OUT_FOLDER
 """
 
+import json
 import os
 import pathlib
 import random
@@ -13,6 +14,8 @@ import signal
 import subprocess
 import sys
 import time
+
+from moving_model import write_moving_model
 
 LINE = re.compile(r"frame (-?\d+) \((\d+) of (\d+)\) (done|kept|failed) (.+)")
 LOOK = ["--size", "32x24", "--spp", "2"]
@@ -258,6 +261,45 @@ def killed(sequence, out, runs):
     assert {name: content for name, content in files(pictures).items() if name in wanted} == wanted
 
 
+def animated(sequence, out):
+    """Animations of models follow the clock of the sequence, also between frames, unless --gltf-time is given."""
+    pictures = empty(out / "animated")
+    model = write_moving_model(pictures / "model.gltf")
+    look = ["--camera", "0,10,60 0,10,0 40", "--density-scale", "0.2", "--ground", "none", "--sun", "20,40 3,3,3", "--sky", "0.4,0.5,0.6"]
+
+    def frames(name, numbers, *more):
+        done = subprocess.run(sequence.command(pictures / f"{name}_####.pfm", "--frames", numbers, *look, *more), capture_output=True,
+                              text=True, timeout=600)
+        assert done.returncode == 0, done.stderr
+        return {float(path.name[len(name) + 1:-4]): path.read_bytes() for path in sorted(pictures.glob(f"{name}_*.pfm"))}
+
+    def single(name, volume, *more):
+        path = pictures / f"{name}.pfm"
+        subprocess.run([sequence.render, *volume, *LOOK, *look, *more, "-o", str(path)], check=True, timeout=300, stderr=subprocess.DEVNULL)
+        return path.read_bytes()
+
+    volume = lambda number: sequence.folder / f"explosion_{number:04}.vdb"
+    clock = frames("clock", "7,13,13.5", "--gltf", str(model))
+    still = frames("still", "7,13,13.5", "--gltf", str(model), "--gltf-time", "0.5")
+    later = frames("later", "13.5", "--gltf", str(model), "--gltf-time", str(12.5 / 24))
+    assert clock[13] == still[13] and clock[7] != still[7] and clock[13.5] != still[13.5], "frame 13 is at 12 / 24 s"
+    assert clock[13.5] == later[13.5]
+    assert clock[7] == single("seventh", [str(volume(7))], "--gltf", str(model), "--gltf-time", "0.25")
+    # The other models of a scene follow it too.
+    scene = pictures / "scene.json"
+
+    def put(name, time):
+        scene.write_text(json.dumps({"cumulet_scene": 3, "volumes": [{"file": name}], "models": [{"file": str(model), "name": "other", "time": time}]}))
+
+    put(str(sequence.folder / "explosion_####.vdb"), 0.1)
+    done = subprocess.run([sequence.render, "--scene", str(scene), *LOOK, *look, "--frames", "7,13", "-o", str(pictures / "scene_####.pfm")],
+                          capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    for number, time in ((7, 0.25), (13, 0.5)):
+        put(str(volume(number)), time)
+        assert (pictures / f"scene_{number:04}.pfm").read_bytes() == single("alone", ["--scene", str(scene)]), number
+
+
 def main():
     render, scene, out = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
     volumes = empty(out / "volumes")
@@ -272,6 +314,7 @@ def main():
     begins_empty(sequence, out)
     interrupted(sequence, out)
     killed(sequence, out, 10)
+    animated(sequence, out)
 
 
 main()
