@@ -112,6 +112,36 @@ double size_of(const cumulet_volume_info& info) {
   return std::hypot(edge(0), edge(1), edge(2));
 }
 
+/// simulated: is_simulation() of the volume's file, or the scene names a grid of fire.
+DefaultMedium default_medium(const cumulet_volume* volume, const SceneVolume& scene, bool simulated) {
+  DefaultMedium made{Content::cloud, scene.medium};
+  cumulet_medium_desc& medium = made.medium;
+  const cumulet_volume_info info = info_of(volume);
+  const double size = size_of(info);
+  float temperature_scale = medium.temperature_scale;
+  if (temperature_scale == 0.0F) temperature_scale = temperature_scale_of(volume).value_or(0.0F);
+  Evidence evidence;
+  evidence.flame = max_of(volume, CUMULET_RAMP_FLAME);
+  evidence.temperature = max_of(volume, CUMULET_RAMP_TEMPERATURE);
+  evidence.kelvin = double{temperature_scale} * evidence.temperature;
+  evidence.simulated = simulated;
+  made.content = size > 0.0 ? content_of(evidence) : Content::cloud;
+  if (made.content == Content::smoke && scene.albedo_given) made.content = Content::cloud;
+  if (made.content == Content::cloud) return made;
+  const bool visible = cumulet_volume_suggest_density_scale(volume, &medium.density_scale) == CUMULET_OK;
+  if (made.content == Content::smoke) {
+    const float given_scale = medium.temperature_scale;
+    apply(Preset::smoke, medium);
+    medium.temperature_scale = given_scale;
+    return made;
+  }
+  if (!visible) medium.density_scale = 0.0;  // a flame without smoke
+  medium.temperature_scale = temperature_scale;
+  apply({.flame = evidence.flame, .temperature = is_fire(evidence.kelvin) ? evidence.temperature : 0.0, .size = size},
+        medium);
+  return made;
+}
+
 }  // namespace
 
 bool is_unsaid(const cumulet_medium_desc& medium) {
@@ -166,32 +196,7 @@ Content content_of(cumulet_inspection* inspection) {
 }
 
 DefaultMedium default_medium(const cumulet_volume* volume, const SceneVolume& scene) {
-  DefaultMedium made{Content::cloud, scene.medium};
-  cumulet_medium_desc& medium = made.medium;
-  const cumulet_volume_info info = info_of(volume);
-  const double size = size_of(info);
-  float temperature_scale = medium.temperature_scale;
-  if (temperature_scale == 0.0F) temperature_scale = temperature_scale_of(volume).value_or(0.0F);
-  Evidence evidence;
-  evidence.flame = max_of(volume, CUMULET_RAMP_FLAME);
-  evidence.temperature = max_of(volume, CUMULET_RAMP_TEMPERATURE);
-  evidence.kelvin = double{temperature_scale} * evidence.temperature;
-  evidence.simulated = names_fire(scene) || is_simulation(scene.volume);
-  made.content = size > 0.0 ? content_of(evidence) : Content::cloud;
-  if (made.content == Content::smoke && scene.albedo_given) made.content = Content::cloud;
-  if (made.content == Content::cloud) return made;
-  const bool visible = cumulet_volume_suggest_density_scale(volume, &medium.density_scale) == CUMULET_OK;
-  if (made.content == Content::smoke) {
-    const float given_scale = medium.temperature_scale;
-    apply(Preset::smoke, medium);
-    medium.temperature_scale = given_scale;
-    return made;
-  }
-  if (!visible) medium.density_scale = 0.0;  // a flame without smoke
-  medium.temperature_scale = temperature_scale;
-  apply({.flame = evidence.flame, .temperature = is_fire(evidence.kelvin) ? evidence.temperature : 0.0, .size = size},
-        medium);
-  return made;
+  return default_medium(volume, scene, names_fire(scene) || is_simulation(scene.volume));
 }
 
 bool show_by_default(cumulet_viewer* viewer, const cumulet_volume_file_desc& file, const SceneVolume& scene) {
@@ -199,7 +204,7 @@ bool show_by_default(cumulet_viewer* viewer, const cumulet_volume_file_desc& fil
   Notes notes;
   const std::shared_ptr<cumulet_volume> volume = open_quietly(file, notes);
   if (!volume || info_of(volume.get()).active_voxels == 0) return false;
-  DefaultMedium made = default_medium(volume.get(), scene);
+  DefaultMedium made = default_medium(volume.get(), scene, true);
   if (made.content == Content::cloud)  // has no visible density if this fails
     static_cast<void>(cumulet_volume_suggest_density_scale(volume.get(), &made.medium.density_scale));
   for (const auto& [level, text] : notes)
