@@ -111,7 +111,10 @@ void VolumeAsset::begin(const Progress* progress) {
                          .high = shown.high,
                          .index_to_world = density.index_to_world,
                          .anisotropy_grid = {},
-                         .coarse = volume::CoarseVolume(density, progress)};
+                         .coarse = volume::CoarseVolume(density, progress),
+                         .temperature_scale = temperature_scale()};
+  if (frame_->flame) volume_info.flame = volume::CoarseVolume(*frame_->flame, progress);
+  if (frame_->temperature) volume_info.temperature = volume::CoarseVolume(*frame_->temperature, progress);
   if (frame_->anisotropy) volume_info.anisotropy_grid = (*frame_->anisotropy)[0].name;
   volume_info_ = std::make_shared<const VolumeInfo>(std::move(volume_info));
 }

@@ -30,7 +30,20 @@ struct VolumeInfo {
   glm::dmat4 index_to_world{1.0};
   std::optional<std::string> anisotropy_grid;  ///< its name
   volume::CoarseVolume coarse;
+  volume::CoarseVolume flame = {};        ///< empty: there is none, or its values are unknown
+  volume::CoarseVolume temperature = {};  ///< as flame
+  double temperature_scale = 1500.0;      ///< kelvin at temperature 1, for media that do not set a scale
 
+  /// Returns the emission settings that apply to this volume, apart from ramps: fills in values that `emission` leaves
+  /// open.
+  [[nodiscard]] scene::Emission emission_by(scene::Emission emission) const {
+    if (!emission.temperature_scale) emission.temperature_scale = temperature_scale;
+    // A volume with only a temperature would be invisible.
+    if (emission.blackbody == 0.0 && coarse.empty() && flame.empty()) emission.blackbody = 1.0;
+    return emission;
+  }
+  /// Returns true if it may emit anywhere.
+  [[nodiscard]] bool has_unknown_emission() const { return may_emit && flame.empty() && temperature.empty(); }
   /// Returns the world bounds of the active voxels of density and flame, or of temperature if there are none.
   /// transform: instance transform.
   [[nodiscard]] Bounds bounds(const glm::dmat4& transform = glm::dmat4(1.0)) const {

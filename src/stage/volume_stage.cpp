@@ -10,6 +10,7 @@
 #include "jobs/build_grid.hpp"
 #include "jobs/cell_budget.hpp"
 #include "jobs/shared_grids.hpp"
+#include "scene/emission_extent.hpp"
 #include "scene/origin.hpp"
 #include "scene/space.hpp"
 
@@ -582,7 +583,8 @@ void VolumeStage::append_bounds(std::vector<Bounds>& boxes) const {
 void VolumeStage::visit_reach(const dvec3& direction, const std::function<void(const dvec3&)>& add) const {
   const VolumeInfoPtr& own = shown_info();
   const std::size_t count = (own ? transforms_.size() : 0) + shown_.size();
-  const auto add_volume = [&](const VolumeInfo& volume, const glm::dmat4& to_world, const Medium& medium) {
+  const auto add_volume = [&](const VolumeInfo& volume, const glm::dmat4& to_world, const Medium& medium,
+                              const scene::Emission& emission) {
     const Bounds box = volume.bounds(to_world);
     const auto add_box = [&] { std::ranges::for_each(corners_of(box.min, box.max), add); };
     // With many volumes, one of them hardly extends the visible bounds.
@@ -592,16 +594,21 @@ void VolumeStage::visit_reach(const dvec3& direction, const std::function<void(c
     }
     const dvec3 along = glm::inverse(glm::dmat3(to_world)) * direction;
     const double density_scale = medium.density_scale / glm::length(along);
-    for (const dvec3& p : volume.coarse.visible(glm::normalize(along), density_scale))
-      add(dvec3(to_world * glm::dvec4(p, 1.0)));
+    const auto add_points = [&](const std::vector<dvec3>& points) {
+      for (const dvec3& p : points) add(dvec3(to_world * glm::dvec4(p, 1.0)));
+    };
+    add_points(volume.coarse.visible(glm::normalize(along), density_scale));
     // Emission is visible at any density.
-    if (volume.may_emit) add_box();
+    if (volume.has_unknown_emission()) return add_box();
+    add_points(scene::emitting_points(volume.flame, volume.temperature, volume.emission_by(emission)));
   };
   for (const scene::InstanceTransform& transform : transforms_) {
-    if (own) add_volume(*own, transform.to_world, seen_medium());
+    if (own) add_volume(*own, transform.to_world, seen_medium(), field_emission());
   }
   for (const Shown& shown : shown_) {
-    if (shown.is_there()) add_volume(*shown.volume_info(), shown.settings.to_world, shown.settings.medium);
+    if (!shown.is_there()) continue;
+    const InstanceSettings& settings = shown.settings;
+    add_volume(*shown.volume_info(), settings.to_world, settings.medium, emission_of(settings.medium, settings.ramps));
   }
 }
 

@@ -322,4 +322,29 @@ std::vector<glm::dvec3> CoarseVolume::visible(const glm::dvec3& direction, doubl
   return points;
 }
 
+double CoarseVolume::most(const Quantity& quantity) const {
+  double most = 0.0;
+  for (const float mean : means_) {
+    if (mean > 0.0F) most = std::max(most, quantity(static_cast<float>(unit_ * double{mean})));
+  }
+  return most;
+}
+
+std::vector<glm::dvec3> CoarseVolume::points_where(const Quantity& quantity, double least) const {
+  std::vector<glm::dvec3> points;
+  for (int k = 0; k < size_.z; ++k) {
+    for (int j = 0; j < size_.y; ++j) {
+      int first = 0;
+      int last = size_.x - 1;
+      while (first <= last && !(of(quantity, {first, j, k}) >= least)) ++first;
+      while (first <= last && !(of(quantity, {last, j, k}) >= least)) --last;
+      if (first > last) continue;
+      // The cells between them are within their hull.
+      for (const glm::dvec3& p : corners_of(glm::dvec3(first, j, k), glm::dvec3(last + 1, j + 1, k + 1)))
+        points.emplace_back(to_world_ * glm::dvec4(p, 1.0));
+    }
+  }
+  return points;
+}
+
 }  // namespace cumulet::volume

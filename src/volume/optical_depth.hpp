@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <glm/glm.hpp>
 #include <optional>
 #include <vector>
@@ -13,6 +14,8 @@ namespace cumulet::volume {
 /// A volume reduced to mean values in at most 96 cells per axis, for estimates of its optical depth and visible extent.
 class CoarseVolume {
  public:
+  /// An empty volume.
+  CoarseVolume() = default;
   /// O(voxels). Throws Error(cancelled) if progress is cancelled.
   explicit CoarseVolume(const ScalarVolume& volume, const Progress* progress = nullptr);
 
@@ -28,6 +31,14 @@ class CoarseVolume {
   /// an opacity of at least 5 % contributes the two points at which half of the corresponding optical depth is reached
   /// from either end. The opposite direction gives the same points. Empty if there is no such ray.
   [[nodiscard]] std::vector<glm::dvec3> visible(const glm::dvec3& direction, double density_scale) const;
+
+  /// A quantity as a function of a voxel value above 0.
+  using Quantity = std::function<double(float)>;
+  [[nodiscard]] bool empty() const { return means_.empty(); }
+  /// Returns the maximum of the quantity over all cells, at least 0. O(cells).
+  [[nodiscard]] double most(const Quantity& quantity) const;
+  /// Returns world-space points around the cells in which the quantity is at least `least`, which is above 0. O(cells).
+  [[nodiscard]] std::vector<glm::dvec3> points_where(const Quantity& quantity, double least) const;
 
  private:
   struct Ray {
@@ -60,6 +71,10 @@ class CoarseVolume {
   template <class Visit>
   void walk(const glm::dvec3& origin, const glm::dvec3& direction, Visit&& visit) const;
   [[nodiscard]] double depth_along(const glm::dvec3& origin, const glm::dvec3& direction) const;
+  [[nodiscard]] double of(const Quantity& quantity, glm::ivec3 cell) const {
+    const double mean = means_[index(cell)];
+    return mean > 0.0 ? quantity(static_cast<float>(unit_ * mean)) : 0.0;
+  }
   /// Returns the box of all non-zero cells.
   [[nodiscard]] std::optional<Box> occupied() const;
   /// Returns a sheet of rays x rays rays that covers the box.

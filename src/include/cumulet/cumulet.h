@@ -3242,9 +3242,9 @@ typedef enum cumulet_clip_space {
  * A perspective or orthographic camera, with a pinhole or a thin lens.
  *
  * If eye equals target, the first viewer that renders through the camera with content places it once, so that it fits
- * the visible scene from +Z and a little above. Visible are triangles, and the volume where its opacity, at the density
- * scale of that time, is at least 5 %; if it is nowhere, its bounding box is used. At least 6 % of the image's shorter
- * side stay free on each side.
+ * the visible scene from +Z and a little above. Visible are triangles, and the volume where, with the medium of that
+ * time, its opacity is at least 5 % or its emission 1 % of the brightest. If it is nowhere, its bounding box is used.
+ * At least 6 % of the image's shorter side stay free on each side.
  *
  * Near and far plane do not clip the volume. They define depth buffers, d = f (z - n) / (z (f - n)), reversed 1 - d;
  * and an orthographic ray starts at the near plane.
