@@ -543,7 +543,7 @@ CUMULET_API cumulet_status cumulet_volume_open(const char* path, const char* gri
 /** Which grids of a file are read, and the transform of the volume. */
 typedef struct cumulet_volume_file_desc {
   size_t struct_size;
-  const char* path;      /**< UTF-8 path of a .vdb or .nvdb file. */
+  const char* path;      /**< UTF-8 path of the volume, of a format that cumulet_volume_open reads. */
   const char* grid_name; /**< The density grid, chosen as by cumulet_volume_open. */
   /**
    * Affine transform from the file's world space to the scene's, in which +Y is up. All zero: identity. For a file
@@ -1014,7 +1014,7 @@ CUMULET_API cumulet_status cumulet_inspection_get_metadata(const cumulet_inspect
 /** The files of a sequence. */
 typedef struct cumulet_sequence_desc {
   size_t struct_size;
-  const char* const* paths; /**< One UTF-8 path of a .vdb or .nvdb file per frame. Files need not exist or be valid. */
+  const char* const* paths; /**< One UTF-8 path of a volume per frame. Files need not exist or be valid. */
   uint64_t count;           /**< Frames, 1 to 1,000,000. */
   /**
    * The grids that are read from each file, and the transform; its path is not used. With suggested_density_scale, one
