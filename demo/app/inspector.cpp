@@ -20,7 +20,7 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
       case Item::Kind::volume:
         return volume(model, *item, commands);
       case Item::Kind::model:
-        return one_model(model.scene.models[item->index]);
+        return one_model(model, model.scene.models[item->index]);
       case Item::Kind::analytic_light:
         return analytic_light(model, model.scene.analytic_lights[item->index]);
     }

@@ -207,6 +207,17 @@ struct OtherVolume {
   Fields fields;
 };
 
+/// The parts of a model's file that its settings choose between.
+struct ModelFile {
+  struct Animation {
+    std::string name;       // "": none
+    double duration = 0.0;  // seconds
+  };
+  std::string file;
+  std::vector<Animation> animations;
+  std::vector<std::string> variants;  // names of the material variants
+};
+
 /// Converts counts to bar heights from 0 to 1, on a logarithmic scale.
 [[nodiscard]] std::vector<float> heights(const std::uint64_t (&counts)[CUMULET_HISTOGRAM_BINS]);
 
@@ -227,8 +238,8 @@ struct Status {
   cumulet_progress work{};
   cumulet_stats stats{};
   cumulet_surfaces_info surfaces{};
-  cumulet_animation_info animation{};  // the selected animation of the surfaces
-  std::vector<std::string> variants;   // material variants of the surfaces
+  ModelFile surfaces_file;             // of the surfaces
+  std::vector<ModelFile> model_files;  // of the other models, if they are open
   std::optional<double> compiled;      // fraction of the first scene's programs that are compiled; nullopt when all are
   bool busy = false;                   // a file is read, a grid is built, a sky is computed or programs are compiled
   std::string loading;                 // file that is being loaded

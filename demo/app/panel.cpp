@@ -241,24 +241,39 @@ void Panel::surfaces(Model& model) {
   settings::for_each<Desc>([&](const auto& setting) {
     if (!setting.is(&Desc::time)) rows_.draw(setting, surface.*setting.field);
   });
-  if (info.animations > 0) {
-    settings::with(&Desc::time, [&](auto time) {
-      time.row.most = std::max(model.status.animation.duration, 1e-3);
-      // If a sequence is shown, the animation uses its clock.
-      double clock = std::max(model.clock, 0.0);
-      ImGui::BeginDisabled(model.status.play.has_value());
-      rows_.draw(time, model.status.play ? clock : surface.time);
-      ImGui::EndDisabled();
-    });
-  }
-  variant(model);
+  animation(model, model.status.surfaces_file, surface.animation, surface.time);
+  variant(model.status.surfaces_file, model.scene.surface_variant);
   ui_.value_row("Triangles", short_count(double(info.triangles)));
 }
 
-void Panel::variant(Model& model) {
-  const std::vector<std::string>& names = model.status.variants;
+void Panel::animation(const Model& model, const ModelFile& file, std::uint32_t& number, double& time) {
+  const std::vector<ModelFile::Animation>& animations = file.animations;
+  if (animations.empty()) return;
+  if (animations.size() > 1) {
+    std::vector<std::string> names;
+    names.reserve(animations.size());
+    for (const ModelFile::Animation& one : animations)
+      names.push_back(one.name.empty() ? "Animation " + std::to_string(names.size() + 1) : one.name);
+    std::vector<Choice> choices;
+    for (std::size_t i = 0; i < names.size(); ++i)
+      choices.push_back({names[i].c_str(), static_cast<int>(i), "An animation of the file."});
+    int chosen = static_cast<int>(number);
+    if (ui_.choose("Animation", "Animation of the model.", choices, chosen))
+      number = static_cast<std::uint32_t>(chosen);
+  }
+  settings::with(&cumulet_surface_settings_desc::time, [&](auto row) {
+    row.row.most = std::max(animations[std::min<std::size_t>(number, animations.size() - 1)].duration, 1e-3);
+    // If a sequence is shown, the animation uses its clock.
+    double clock = std::max(model.clock, 0.0);
+    ImGui::BeginDisabled(model.status.play.has_value());
+    rows_.draw(row, model.status.play ? clock : time);
+    ImGui::EndDisabled();
+  });
+}
+
+void Panel::variant(const ModelFile& file, std::string& wanted) {
+  const std::vector<std::string>& names = file.variants;
   if (names.empty()) return;
-  std::string& wanted = model.scene.surface_variant;
   std::vector<Choice> choices = {{"none", 0, "The default materials of the file."}};
   int chosen = wanted.empty() ? 0 : -1;
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -64,7 +64,7 @@ class Panel {
   void ocio(Model& model, std::vector<Command>& commands);
   void light(Model& model, std::vector<Command>& commands);
   void environment(Model& model, std::vector<Command>& commands);
-  void one_model(SceneModel& one);
+  void one_model(const Model& model, SceneModel& one);
   void analytic_light(Model& model, cumulet_light_desc& analytic_light);
   void sequence(Model& model, std::vector<Command>& commands);
   /// Draws the timeline below the image: the frames, their states and the current frame.
@@ -83,7 +83,10 @@ class Panel {
   // Draws the presets of a color ramp, and the buttons that copy and paste it.
   void choose_colors(Model& model, settings::ColorStops& stops, std::size_t index, float most);
   void surfaces(Model& model);
-  void variant(Model& model);
+  // Draws the animation of a model and the time in it.
+  void animation(const Model& model, const ModelFile& file, std::uint32_t& number, double& time);
+  // Draws the material variant of a model.
+  void variant(const ModelFile& file, std::string& wanted);
   void grid(Model& model);
   void sampling(Model& model);
   void advanced_sampling(Model& model);

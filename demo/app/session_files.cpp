@@ -32,6 +32,25 @@ std::optional<Box> box_of(Handle* handle, Get get) {
   return box_of(info);
 }
 
+ModelFile model_file(const std::string& file, const cumulet_surfaces* surfaces) {
+  ModelFile made{file, {}, variant_names(surfaces)};
+  cumulet_animation_info info{};
+  info.struct_size = sizeof info;
+  for (std::uint32_t i = 0; cumulet_surfaces_get_animation(surfaces, i, &info) == CUMULET_OK; ++i)
+    made.animations.push_back({info.name, info.duration});
+  return made;
+}
+
+/// Reads files that are open now, and drops those that the models do not name.
+void follow_files(std::vector<ModelFile>& files, const std::vector<SceneModel>& models, const Models& open) {
+  std::erase_if(files, [&](const ModelFile& file) { return open.surfaces(file.file) == nullptr; });
+  for (const SceneModel& model : models) {
+    const cumulet_surfaces* surfaces = open.surfaces(model.file);
+    if (surfaces != nullptr && std::ranges::find(files, model.file, &ModelFile::file) == files.end())
+      files.push_back(model_file(model.file, surfaces));
+  }
+}
+
 }  // namespace
 
 // Sets a flag and wakes the viewer's thread when opening is done, also after an exception.
@@ -223,6 +242,7 @@ void Session::follow_models() {
   } catch (const std::runtime_error& error) {
     add_notice(true, error.what());
   }
+  follow_files(status_.model_files, scene_.models, models_);
   if (opening_model_.made.valid() || surfaces_.loading) return;  // the pending surfaces may be the same file
   const std::vector<std::string> missing = models_.missing(scene_.models);
   if (missing.empty()) return;
@@ -258,10 +278,7 @@ void Session::finish_models() {
 
 void Session::follow_surfaces() {
   const bool other_settings = given_.take(scene_.surface);
-  if (other_settings || known_->surface_variant != scene_.surface_variant) {
-    set_surfaces();
-    if (known_->surface.animation != scene_.surface.animation) read_surfaces();
-  }
+  if (other_settings || known_->surface_variant != scene_.surface_variant) set_surfaces();
   known_->surface = scene_.surface;
   known_->surface_variant = scene_.surface_variant;
   if (!surfaces_.take(scene_.surfaces)) return;
@@ -280,7 +297,7 @@ void Session::set_surfaces() {
   try {
     // The variant of surfaces that are still loading is resolved when they are loaded.
     if (surfaces_.passed == scene_.surfaces && !surfaces_.loading)
-      settings.variant = variant_number(scene_.surfaces, scene_.surface_variant, status_.variants);
+      settings.variant = variant_number(scene_.surfaces, scene_.surface_variant, status_.surfaces_file.variants);
   } catch (const std::runtime_error& error) {
     add_notice(true, error.what());
   }
@@ -293,8 +310,7 @@ void Session::remove_surfaces() {
   surfaces_.passed.clear();
   surfaces_.shown.clear();
   status_.surfaces = {};
-  status_.animation = {};
-  status_.variants.clear();
+  status_.surfaces_file = {};
 }
 
 void Session::finish_surfaces() {
@@ -333,12 +349,7 @@ void Session::read_surfaces() {
   info = {};
   info.struct_size = sizeof info;
   check(cumulet_surfaces_get_info(shown, &info));
-  cumulet_animation_info& animation = status_.animation;
-  animation = {};
-  animation.struct_size = sizeof animation;
-  const std::uint32_t number = scene_.surface.animation;
-  if (number < info.animations) check(cumulet_surfaces_get_animation(shown, number, &animation));
-  status_.variants = variant_names(shown);
+  status_.surfaces_file = model_file(scene_.surfaces, shown);
   cumulet_surfaces_release(shown);
 }
 

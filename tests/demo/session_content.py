@@ -7,6 +7,7 @@ import struct
 import subprocess
 
 from demo_session import ALIKE, assert_alike, assert_differ, assert_drawn, assert_saved, look, SETTLE, shot, shown, tab
+from moving_model import write_moving_model
 from png import difference
 
 
@@ -253,6 +254,43 @@ def test_surfaces(s):
     assert "surfaces" not in removed_report["scene"]
     assert_differ(none, removed, area)
     assert_alike(none, look(s, "back")[0], area)
+
+
+def test_animated_model(s):
+    """An added model has rows for its animation, the time in it and its material variant, as the first model has. While
+    a sequence is shown, the time is that of its clock."""
+    write_moving_model(s.out / "rising.gltf")
+    camera = {"eye": [-5, 4, 44], "target": [-5, 4, 0]}
+    light = {"environment": {"sun": {"azimuth_degrees": 20, "irradiance": [3, 3, 3]}, "sky": {"radiance": [0.4, 0.5, 0.6]}}}
+    still = {"cumulet_scene": 2, "models": [{"file": "rising.gltf"}, {"file": "rising.gltf", "translate": [-15, 0, 1]}], "camera": camera, **light}
+    (s.out / "still.json").write_text(json.dumps(still))
+    there = ["frames 3", "wait loaded", "wait converged", "frames 2"]
+    choose = lambda label, entry: [f'click "{label}"', "frames 2", f'click "{label}/{entry}"', *there, "move viewport 0.02 0.5", *there]
+    rows = lambda name: [f'click "Scene/{name}"', *there]
+    s.play("models",
+           [*there, *rows("Model 1"), *shot("before"), 'drag "Time" 0.01 0.5 to "Time" 0.5 0.5', *there, *shot("risen"),
+            *choose("Animation", "slide"), *shot("slid"), *choose("Variant", "green"), *shot("green"), "key ctrl+z", *there, *shot("undone")],
+           "--scene", "still.json", "--spp", "4", size=["--size", "1000x700"])
+    model = lambda name: s.report(name)["models"][1]
+    area = look(s, "before")[2]
+    image = lambda name: look(s, name)[0]
+    risen = model("risen")["time"]
+    assert 0.7 < risen < 1.3, f"the slider ends at the animation's 2 s: {risen}"
+    assert "time" not in model("before") and model("slid")["animation"] == 1 and model("slid")["time"] == risen
+    assert model("green")["variant"] == "green" and "variant" not in model("undone")
+    for one, other in (("before", "risen"), ("risen", "slid"), ("slid", "green")):
+        assert_differ(image(one), image(other), area)
+    assert_alike(image("slid"), image("undone"), area)
+    for number in (1, 2, 3):
+        shutil.copy(s.explosion, s.out / f"fire_{number}.vdb")
+    (s.out / "playing.json").write_text(json.dumps({**still, "volumes": [{"file": "fire_#.vdb", "medium": {"density_scale": 0.2, "max_bounces": 2}}],
+                                                    "sequence": {"frame": 1, "frames_per_second": 2}}))
+    s.play("playing", [*there, *rows("Model 1"), *shot("first"), 'click "Last"', *there, *shot("last"),
+                       'drag "Time" 0.5 0.5 to "Time" 0.1 0.5', *there, *shot("dragged")],
+           "--scene", "playing.json", "--spp", "4", size=["--size", "1000x700"])
+    assert_differ(image("first"), image("last"), look(s, "last")[2])
+    assert_alike(image("last"), image("dragged"), look(s, "last")[2])
+    assert s.report("dragged")["undo_steps"] == 0, "the row is disabled"
 
 
 def test_negative_frames(s):
