@@ -83,7 +83,7 @@ def test_ended(s):
     """A signal, such as that of the desktop's logout, ends the program without a loss: the recent files and the unsaved
     changes are kept, and no unfinished file."""
     (s.out / "ended.replay").write_text("\n".join(["frames 3", "wait loaded", "frames 3", "key ]", "frames 9", 'report "live.json"', "idle 60"]))
-    demo = subprocess.Popen([s.demo, *SIZE, "--spp", "1", s.cumulus, "--replay", "ended.replay"], cwd=s.out, env=s.environment)
+    demo = subprocess.Popen([s.demo, *SIZE, "--spp", "1", "--exposure", "0", s.cumulus, "--replay", "ended.replay"], cwd=s.out, env=s.environment)
     try:
         while not (s.out / "live.json").exists():
             assert demo.poll() is None
@@ -125,6 +125,6 @@ def test_recovery(s):
     assert saved["title"] == "scene.json - Cumulet" and (s.out / "scene.json").read_text() != before
     assert not copy.exists(), "saved changes need no copy"
     # A scene without a file, whose copy is deleted.
-    killed(s, "second", s.cumulus)
+    killed(s, "second", s.cumulus, "--exposure", "0")
     s.play("discarded", ["frames 5", *shot("nameless"), 'click "Question/Discard"', "frames 3", *shot("discarded")], "--spp", "1")
     assert s.report("nameless")["question"] and not s.report("discarded")["has_content"] and not copy.exists()
