@@ -726,7 +726,7 @@ std::optional<RenderOptions> parse_render_options(std::vector<std::string> argum
       "Ctrl-C writes the samples so far and exits with 1; a second Ctrl-C stops at once.\n"
       "Without --stats, --trace and --checkpoint, a .png is first written after 10 s, and then improves.\n"
       "For a sequence, one line per frame is printed: frame 12 (3 of 20) done|kept|failed FILE...\n"
-      "Animations of models follow the clock of the sequence, unless --gltf-time is given.\n"
+      "With --gltf-time, animations of models stay at one time. Else they follow the clock of the sequence.\n"
       "Frames that cannot be read fail, and the others are rendered; the exit status is then 1.\n"
       "Ctrl-C does not write the current frame of a sequence.");
   // Added before the flags, which override the scene.
