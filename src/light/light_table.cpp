@@ -69,7 +69,8 @@ glm::vec3 level_irradiance(const DistantLights& distant, const Surroundings& sur
   const glm::dvec3 sky = surroundings.environment
                              ? surroundings.environment->level_irradiance * double{surroundings.strength}
                              : std::numbers::pi * glm::dvec3(distant.sky_radiance);
-  return glm::vec3(sky + glm::dvec3(distant.sun_irradiance) * std::max(0.0, distant.to_sun.y));
+  const glm::vec3 sun = distant.sun_irradiance * static_cast<float>(std::max(0.0, distant.to_sun.y));
+  return glm::vec3(sky) + sun;
 }
 
 glm::vec2 turn_of(const Surroundings& surroundings) {
