@@ -74,7 +74,8 @@ TEST(LevelIrradiance, MatchesClosedForms) {
   });
   EXPECT_NEAR(of(cosine, {}, 3.0F).x, 3.0 * 2.0 * pi / 3.0, 1e-3);
   EXPECT_NEAR(of(cosine, lights, 1.0F).x, 2.0 * pi / 3.0 + 1.6, 1e-3) << "it replaces the sky, but not the sun";
-  const auto below = test::environment_of(8, 4, [](std::uint32_t, std::uint32_t y) { return vec3(y > 1 ? 5.0F : 0.0F); });
+  const auto below =
+      test::environment_of(8, 4, [](std::uint32_t, std::uint32_t y) { return vec3(y > 1 ? 5.0F : 0.0F); });
   lights.to_sun.y = -0.8;
   EXPECT_EQ(of(below, lights, 1.0F), vec3(0.0F));
 }
