@@ -32,7 +32,7 @@ CM_FN float cm_ground_distance(vec3 o, vec3 d) {
 
 CM_FN bool cm_ground_catches() { return CM_GROUND != 0 && cm.ground.catches != 0u; }
 
-// The same, for a ground that all rays hit.
+// Returns the distance to a ground that all rays hit; CM_NO_GROUND for a shadow catcher.
 CM_FN float cm_solid_ground_distance(vec3 o, vec3 d) {
   return cm_ground_catches() ? CM_NO_GROUND : cm_ground_distance(o, d);
 }

@@ -106,6 +106,7 @@ const std::array fields{
     CM_FIELD(ground, albedo),
     CM_FIELD(ground, height),
     CM_FIELD(ground, reach),
+    CM_FIELD(ground, catches),
     CM_FIELD(layers, count),
     CM_FIELD(layers, blended),
     CM_FIELD(layers, size),
