@@ -416,8 +416,9 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
     if (words(sun).size() == 1) throw UsageError("--sun: " + in_quotes(sun) + " needs an irradiance, or --sky-model");
   }
   const bool analytic_lights_alone = !scene.analytic_lights.empty() && app.count("--sky-model") == 0;
-  if (!files.scene && app.count("--scene") == 0 && app.count("--sun") == 0 && app.count("--sky") == 0 &&
-      app.count("--env") == 0 && !analytic_lights_alone) {
+  const bool with_scene = files.scene || app.count("--scene") > 0;
+  if (!with_scene && app.count("--sun") == 0 && app.count("--sky") == 0 && app.count("--env") == 0 &&
+      !analytic_lights_alone) {
     const cumulet_sun_sky_desc given = scene.light;
     scene.set_daylight();
     if (app.count("--sky-model") > 0) {
@@ -430,7 +431,6 @@ void finish_scene_options(const CLI::App& app, SceneOptions& scene, const NamedF
       if (!has_model || !cut_out) scene.ground.mode = CUMULET_GROUND_BELOW;
     }
   }
-  const bool with_scene = files.scene || app.count("--scene") > 0;
   // The environment shows its own ground.
   if (!with_scene && !scene.environment.empty() && app.count("--ground") == 0 &&
       scene.display.background == CUMULET_BACKGROUND_SKY)

@@ -1,6 +1,6 @@
 """The first image of cumulet-render with default settings. A cloud is neither black nor overexposed, at any density. An
-explosion shows flames in dark smoke at dusk, also as the frames of a sequence. Gray smoke is exposed for what it shows,
-unless a flag or a scene file sets the exposure.
+explosion shows flames in dark smoke at dusk, also as the frames of a sequence. Gray smoke gets the exposure that suits
+it, unless a flag or a scene file sets the exposure.
 
 Usage: first_picture.py RENDER CLOUD EXPLOSION OUT_FOLDER
 """
