@@ -15,6 +15,11 @@
 #define CM_GROUND 1
 #endif
 
+// CM_SHADOW_CATCHER 0: the ground is no shadow catcher.
+#ifndef CM_SHADOW_CATCHER
+#define CM_SHADOW_CATCHER 1
+#endif
+
 // CM_GROUND_AIMS 1: some rays from the ground are aimed at the bounds of a medium with emission.
 #define CM_GROUND_AIMS (CM_GROUND && CM_CHANNELS)
 
@@ -30,7 +35,7 @@ CM_FN float cm_ground_distance(vec3 o, vec3 d) {
 #endif
 }
 
-CM_FN bool cm_ground_catches() { return CM_GROUND != 0 && cm.ground.catches != 0u; }
+CM_FN bool cm_ground_catches() { return CM_GROUND != 0 && CM_SHADOW_CATCHER != 0 && cm.ground.catches != 0u; }
 
 // Returns the distance to a ground that all rays hit; CM_NO_GROUND for a shadow catcher.
 CM_FN float cm_solid_ground_distance(vec3 o, vec3 d) {

@@ -47,7 +47,8 @@ bool is_possible(const PathFeatures& f) {
   const bool emitting = f.triangles == PathTriangles::emitting;
   if ((f.volume_holdout || f.motion || f.grid.clipped) && !f.grid.several) return false;
   if (!f.anisotropic && (f.ground_or_disk || f.grid.several || f.second_lobe)) return false;
-  if (!f.ground_or_disk && (f.grid.several || f.layered != Layered::no || f.has_stages() || f.channels ||
+  if (!f.ground_or_disk && f.shadow_catcher) return false;
+  if (!f.shadow_catcher && (f.grid.several || f.layered != Layered::no || f.has_stages() || f.channels ||
                             f.analytic_lights || f.separate_volume_aov || f.light_groups > 0))
     return false;
   if (f.clear_surfaces && f.extended_bsdf == 0) return false;
@@ -61,7 +62,7 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
   int pictures = 0;
   for (const bool several : {false, true}) {
     for (const PathTriangles triangles : {PathTriangles::none, PathTriangles::hit, PathTriangles::emitting}) {
-      for (unsigned bits = 0; bits < 1U << 17U; ++bits) {
+      for (unsigned bits = 0; bits < 1U << 18U; ++bits) {
         const auto bit = [&](unsigned i) { return (bits >> i & 1U) != 0; };
         PathFeatures features;
         features.grid = {March::dense, false, 1, false, several, false, bit(14)};
@@ -81,6 +82,7 @@ TEST(PathFeatures, NeedOnlyDeclaredVariants) {
         features.separate_volume_aov = bit(11);
         features.ground_or_disk = !bit(12);
         features.anisotropic = !bit(13);
+        features.shadow_catcher = !bit(17);
         if (!is_possible(features)) continue;
         ASSERT_EQ(undeclared(features), "");
         ++pictures;
@@ -120,11 +122,13 @@ TEST(PathFeatures, NeedOnlyDeclaredVariantsForEachGrid) {
   }
 }
 
-TEST(PathFeatures, PlainPathsHaveNoGroundAndNoDisk) {
+TEST(PathFeatures, PlainPathsLeaveOutUnusedGroundsAndDisks) {
   PathFeatures features;
   features.grid = {March::tet, true, 1, false, false};
   const std::string general = text_of(trace_key(features));
   EXPECT_EQ(general, "trace.comp, CM_MARCH 0, CM_LINEAR 1, CM_PAGES 1");
+  features.shadow_catcher = false;
+  EXPECT_EQ(text_of(trace_key(features)), general + ", CM_SHADOW_CATCHER 0");
   features.ground_or_disk = false;
   EXPECT_EQ(text_of(trace_key(features)), general + ", CM_GROUND 0, CM_SUN_DISK 0");
   features.anisotropic = false;

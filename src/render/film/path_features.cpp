@@ -114,6 +114,7 @@ PathFeatures path_features(const MarchData& data, const PictureParameters& param
                      !features.channels && !features.analytic_lights && !features.separate_volume_aov &&
                      features.light_groups == 0 && features.layered == Layered::no;
   features.ground_or_disk = !plain || parameters.ground.reach > 0.0F || parameters.lights.sun_spread > 0.0F;
+  features.shadow_catcher = !plain || (parameters.ground.reach > 0.0F && parameters.ground.catches != 0U);
   features.anisotropic = features.ground_or_disk || features.second_lobe || medium.anisotropy != 0.0F;
   return features;
 }
@@ -135,6 +136,8 @@ gl::ProgramKey trace_key(const PathFeatures& features) {
   if (!features.ground_or_disk) {
     more.push_back(macros::ground(0));
     more.push_back(macros::sun_disk(0));
+  } else if (!features.shadow_catcher) {
+    more.push_back(macros::shadow_catcher(0));
   }
   if (!features.anisotropic) more.push_back(macros::isotropic(1));
   add_medium(features, more);

@@ -59,6 +59,7 @@ struct PathFeatures {
   bool separate_volume_aov = false;
   // In pictures with previews these do not depend on the scene, so that changes of it need no other program.
   bool ground_or_disk = true;  // there is a ground, or the sun is a disk
+  bool shadow_catcher = true;  // the ground may be a shadow catcher
   bool anisotropic = true;     // the phase function has more than one value
 
   /// True if paths run in wavefront stages; else in one kernel.
