@@ -112,7 +112,8 @@ void VolumeAsset::begin(const Progress* progress) {
                          .index_to_world = density.index_to_world,
                          .anisotropy_grid = {},
                          .coarse = volume::CoarseVolume(density, progress),
-                         .temperature_scale = temperature_scale()};
+                         .emission_defaults = {.has_only_temperature = density.empty() && !is_there(frame_->flame)}};
+  if (frame_->temperature) volume_info.emission_defaults.temperature_scale = temperature_scale();
   if (frame_->flame) volume_info.flame = volume::CoarseVolume(*frame_->flame, progress);
   if (frame_->temperature) volume_info.temperature = volume::CoarseVolume(*frame_->temperature, progress);
   if (frame_->anisotropy) volume_info.anisotropy_grid = (*frame_->anisotropy)[0].name;
@@ -236,20 +237,8 @@ grid::LatticePtr VolumeAsset::lattice(const volume::Ramp& ramp, const grid::Chan
   return latticed_->lattice;
 }
 
-double VolumeAsset::scale_of(const volume::Ramp& temperature_ramp) const {
-  if (temperature_ramp.empty()) return temperature_scale();
-  float most = 0.0F;
-  for (const glm::vec2& point : temperature_ramp.points()) most = std::max(most, point.y);
-  return volume::temperature_scale_of(most);
-}
-
 scene::Emission VolumeAsset::emission_by(const scene::Emission& emission) const {
-  scene::Emission given = emission;
-  if (!given.temperature_scale && frame_->temperature) given.temperature_scale = scale_of(given.temperature_ramp);
-  // A volume with only a temperature would be invisible.
-  const bool alone = frame_->density.empty() && (!frame_->flame || frame_->flame->empty());
-  if (given.blackbody == 0.0 && alone) given.blackbody = 1.0;
-  return given;
+  return volume_info_->emission_defaults.complete(emission);
 }
 
 VolumeAsset::Weighing VolumeAsset::weighing(const std::shared_ptr<const volume::VolumeFrame>& frame,

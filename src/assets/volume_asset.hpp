@@ -32,16 +32,8 @@ struct VolumeInfo {
   volume::CoarseVolume coarse;
   volume::CoarseVolume flame = {};        ///< empty: there is none, or its values are unknown
   volume::CoarseVolume temperature = {};  ///< as flame
-  double temperature_scale = 1500.0;      ///< kelvin at temperature 1, for media that do not set a scale
+  scene::EmissionDefaults emission_defaults = {};
 
-  /// Returns the emission settings that apply to this volume, apart from ramps: fills in values that `emission` leaves
-  /// open.
-  [[nodiscard]] scene::Emission emission_by(scene::Emission emission) const {
-    if (!emission.temperature_scale) emission.temperature_scale = temperature_scale;
-    // A volume with only a temperature would be invisible.
-    if (emission.blackbody == 0.0 && coarse.empty() && flame.empty()) emission.blackbody = 1.0;
-    return emission;
-  }
   /// Returns true if it may emit anywhere.
   [[nodiscard]] bool has_unknown_emission() const { return may_emit && flame.empty() && temperature.empty(); }
   /// Returns the world bounds of the active voxels of density and flame, or of temperature if there are none.
@@ -137,8 +129,6 @@ class VolumeAsset {
  private:
   void begin(const Progress* progress);
   [[nodiscard]] std::uint64_t derived_bytes() const;
-  // Temperature scale after the ramp has been applied.
-  [[nodiscard]] double scale_of(const volume::Ramp& temperature_ramp) const;
   using Frames = std::vector<std::shared_ptr<const volume::VolumeFrame>>;
   // The frame, or the frames at shutter open and close.
   [[nodiscard]] Frames frames() const;

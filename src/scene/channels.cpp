@@ -91,41 +91,6 @@ glm::dvec3 flame_color_of(const Emission& emission) {
 }
 float intensity_of(const Emission& emission) { return static_cast<float>(std::min(emission.blackbody, max_radiance)); }
 
-class CellEmission {
- public:
-  explicit CellEmission(const Emission& emission) : emission_(emission), flame_color_(flame_color_of(emission)) {}
-
-  /// Returns the emission for these field values.
-  [[nodiscard]] vec3 operator()(float temperature_value, float flame_value) const {
-    const float temperature = emission_.temperature_ramp(temperature_value);
-    glm::dvec3 light = double{emission_.flame_ramp(flame_value)} * flame_light(flame_value);
-    if (temperature > 0.0F && emission_.blackbody > 0.0)
-      light += hot(temperature_value, temperature) * glm::dvec3(emission_.blackbody_tint);
-    return {glm::min(light, glm::dvec3(max_radiance))};
-  }
-
- private:
-  // Returns the color times the strength.
-  [[nodiscard]] glm::dvec3 flame_light(float field_value) const {
-    if (emission_.flame_colors.empty()) return flame_color_;
-    return glm::dvec3(emission_.flame_colors(field_value)) * emission_.flame_strength;
-  }
-  // Returns the emission of a field value whose mapped value is `temperature`, without the tint.
-  [[nodiscard]] glm::dvec3 hot(float field_value, float temperature) const {
-    constexpr double hottest = 1e6;
-    const double kelvin =
-        std::min(emission_.temperature_offset + emission_.kelvin_a_value() * static_cast<double>(temperature), hottest);
-    if (emission_.temperature_colors.empty())
-      return {black_body_.emission(static_cast<float>(kelvin), intensity_of(emission_))};
-    return light::black_body_radiance(kelvin, double{intensity_of(emission_)}) *
-           glm::dvec3(emission_.temperature_colors(field_value));
-  }
-
-  Emission emission_;
-  glm::dvec3 flame_color_;
-  light::BlackBody black_body_;
-};
-
 // Reads the density of a brick and applies the ramp.
 void read_density(const volume::VolumeFrame& frame, const volume::Ramp& ramp, const ivec3& origin, Values& density) {
   read(frame.density, origin, density);
@@ -220,6 +185,42 @@ std::array<ScalarVolume, count> fields_of(const glm::dmat4& index_to_world, cons
 
 }  // namespace
 
+Emission EmissionDefaults::complete(Emission emission) const {
+  if (!emission.temperature_scale && temperature_scale) {
+    float largest = 0.0F;
+    for (const glm::vec2& point : emission.temperature_ramp.points()) largest = std::max(largest, point.y);
+    emission.temperature_scale =
+        emission.temperature_ramp.empty() ? *temperature_scale : volume::temperature_scale_of(largest);
+  }
+  if (emission.blackbody == 0.0 && has_only_temperature) emission.blackbody = 1.0;
+  return emission;
+}
+
+FieldEmission::FieldEmission(const Emission& emission) : emission_(emission) {}
+
+glm::dvec3 FieldEmission::flame(float value) const {
+  const double strength = double{emission_.flame_ramp(value)};
+  if (emission_.flame_colors.empty()) return strength * flame_color_of(emission_);
+  return strength * (glm::dvec3(emission_.flame_colors(value)) * emission_.flame_strength);
+}
+
+glm::dvec3 FieldEmission::black_body(float value) const {
+  const float temperature = emission_.temperature_ramp(value);
+  if (!(temperature > 0.0F) || !(emission_.blackbody > 0.0)) return {};
+  constexpr double hottest = 1e6;
+  const double kelvin =
+      std::min(emission_.temperature_offset + emission_.kelvin_a_value() * double{temperature}, hottest);
+  const glm::dvec3 tint(emission_.blackbody_tint);
+  if (emission_.temperature_colors.empty())
+    return glm::dvec3(black_body_.emission(static_cast<float>(kelvin), intensity_of(emission_))) * tint;
+  return light::black_body_radiance(kelvin, double{intensity_of(emission_)}) *
+         glm::dvec3(emission_.temperature_colors(value)) * tint;
+}
+
+vec3 FieldEmission::operator()(float temperature_value, float flame_value) const {
+  return {glm::min(flame(flame_value) + black_body(temperature_value), glm::dvec3(max_radiance))};
+}
+
 core::CmBrickEmissive shader_emissive(const Emission& emission, const light::BlackBody& body) {
   core::CmBrickEmissive emissive{};
   const auto put = [](const volume::Ramp& ramp, core::CmRampPart* to) {
@@ -259,7 +260,7 @@ std::optional<grid::RgbField::Components> emission_of(const volume::VolumeFrame&
   BrickSet set("temperature or flame");
   if (burns) set.add(*frame.flame);
   if (hot) set.add(*frame.temperature);
-  const CellEmission emissive(emission);
+  const FieldEmission emissive(emission);
   struct Read {
     Values flame{};
     Values temperature{};

@@ -22,8 +22,8 @@ namespace cumulet::scene {
 struct Emission {
   double flame_strength = 1.0;  ///< radiance per world unit of length where flame is 1
   glm::vec3 flame_color{1.0F};
-  /// Kelvin = offset + scale * field value. If empty, VolumeAsset::emission_by chooses a value for the volume; the
-  /// fallback is 1500.
+  /// Kelvin = offset + scale * field value. If empty, EmissionDefaults chooses a value for the volume; the fallback is
+  /// 1500.
   std::optional<double> temperature_scale = {};
   double temperature_offset = 0.0;
   double blackbody = 0.0;  ///< intensity of black-body emission (light::BlackBody); 0: none
@@ -42,6 +42,31 @@ struct Emission {
   [[nodiscard]] bool burns() const { return flame_strength > 0.0 && flame_color != glm::vec3(0.0F); }
   /// Whether a temperature field emits with these settings.
   [[nodiscard]] bool is_hot() const { return blackbody > 0.0 && blackbody_tint != glm::vec3(0.0F); }
+};
+
+/// Values that a volume chooses for emission settings which leave them open.
+struct EmissionDefaults {
+  std::optional<double> temperature_scale = {};  ///< kelvin at temperature 1; empty: it has no temperature
+  bool has_only_temperature = false;             ///< it would be invisible without black-body emission
+
+  /// Returns the settings with these values. A temperature ramp chooses its own scale by its largest output.
+  [[nodiscard]] Emission complete(Emission emission) const;
+};
+
+/// Evaluates the emission of field values: radiance per world unit of length, linear Rec. 709.
+class FieldEmission {
+ public:
+  explicit FieldEmission(const Emission& emission);
+  /// Returns the emission of a flame value.
+  [[nodiscard]] glm::dvec3 flame(float value) const;
+  /// Returns the emission of a temperature value.
+  [[nodiscard]] glm::dvec3 black_body(float value) const;
+  /// Returns their sum, at most 1e12.
+  [[nodiscard]] glm::vec3 operator()(float temperature_value, float flame_value) const;
+
+ private:
+  Emission emission_;
+  light::BlackBody black_body_;
 };
 
 /// Maps a density field to scattering.

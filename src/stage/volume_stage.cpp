@@ -600,7 +600,7 @@ void VolumeStage::visit_reach(const dvec3& direction, const std::function<void(c
     add_points(volume.coarse.visible(glm::normalize(along), density_scale));
     // Emission is visible at any density.
     if (volume.has_unknown_emission()) return add_box();
-    add_points(scene::emitting_points(volume.flame, volume.temperature, volume.emission_by(emission)));
+    add_points(scene::emitting_points(volume.flame, volume.temperature, volume.emission_defaults.complete(emission)));
   };
   for (const scene::InstanceTransform& transform : transforms_) {
     if (own) add_volume(*own, transform.to_world, seen_medium(), field_emission());
