@@ -1,6 +1,6 @@
 // Kernels over the shaders' shared files, for the costs on NVIDIA's GPUs (tests/gpu_cost/README.md). They are only
-// compiled. Each is as the stage of trace.comp for one volume of cells without channels, but paths and pixels are
-// structs in global memory.
+// compiled. Each is as the stage of trace.comp for one volume of cells without channels or shadow catcher, but paths and
+// pixels are structs in global memory.
 #include "glsl.cuh"
 
 namespace cumulet::core {
@@ -8,6 +8,7 @@ namespace cumulet::core {
 #define CM_MARCH 0
 #define CM_PAGES 1
 #define CM_KEEPS_ENTRY 1
+#define CM_SHADOW_CATCHER 0
 #include "common/bindings.glsl"
 #include "common/parameters.glsl"
 __constant__ CmParameters cm;
