@@ -4,6 +4,8 @@
 #include <cctype>
 #include <system_error>
 
+#include "base/base64.hpp"
+
 namespace cumulet::surface::detail {
 
 namespace {
@@ -42,39 +44,15 @@ std::string decode_percent(std::string_view uri, const Budget* budget = nullptr)
   return text;
 }
 
-/// Returns the value of a digit, in either alphabet of RFC 4648.
-std::optional<std::uint32_t> base64_digit(char c) {
-  if (c >= 'A' && c <= 'Z') return static_cast<std::uint32_t>(c - 'A');
-  if (c >= 'a' && c <= 'z') return static_cast<std::uint32_t>(c - 'a') + 26;
-  if (c >= '0' && c <= '9') return static_cast<std::uint32_t>(c - '0') + 52;
-  if (c == '+' || c == '-') return 62;
-  if (c == '/' || c == '_') return 63;
-  return std::nullopt;
-}
-
-/// Ignores white space, and "=" at the end.
 std::vector<std::uint8_t> decode_base64(std::string_view text, const Budget& budget) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(text.size() / 4 * 3 + 3);
-  std::uint32_t bits = 0;
-  unsigned count = 0;
-  bool ended = false;
+  Base64Decoder decoder;
   for (std::size_t i = 0; i < text.size(); ++i) {
     budget.check(i);
-    const char c = text[i];
-    if (std::isspace(static_cast<unsigned char>(c)) != 0) continue;
-    if (c == '=') {
-      ended = true;
-      continue;
-    }
-    const auto value = base64_digit(c);
-    if (!value || ended) malformed("a data URI is not base64");
-    bits = bits << 6U | *value;
-    count += 6;
-    if (count >= 8) {
-      count -= 8;
-      bytes.push_back(static_cast<std::uint8_t>(bits >> count));
-    }
+    const Base64Decoder::Step step = decoder.take(text[i]);
+    if (step == Base64Decoder::Step::bad) malformed("a data URI is not base64");
+    if (step == Base64Decoder::Step::byte) bytes.push_back(decoder.byte());
   }
   return bytes;
 }

@@ -7,26 +7,14 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <string_view>
 #include <vector>
+
+#include "support/base64.hpp"
 
 namespace cumulet::test {
 
 using nlohmann::json;
 using Bytes = std::vector<std::uint8_t>;
-
-inline std::string base64(const Bytes& bytes) {
-  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k) bits = bits << 8U | (i + k < bytes.size() ? bytes[i + k] : 0U);
-    for (unsigned k = 0; k < 4; ++k) {
-      text += i + k <= bytes.size() ? digits[bits >> (18U - 6U * k) & 63U] : '=';
-    }
-  }
-  return text;
-}
 
 template <class T>
 Bytes bytes_of(const std::vector<T>& values) {
