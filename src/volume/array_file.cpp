@@ -1,215 +1,20 @@
 #include "volume/array_file.hpp"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
-#include <new>
 #include <type_traits>
 #include <utility>
 
 #include "base/number_parsing.hpp"
+#include "volume/array_pieces.hpp"
 #include "volume/memory.hpp"
+#include "volume/source_file.hpp"
 
 namespace cumulet::volume::detail {
 
 namespace {
-
-constexpr int max_side = 1 << 20;
-constexpr std::size_t piece_bytes = std::size_t{1} << 20U;
-constexpr std::uint64_t max_expansion = 1040;  // zlib's, rounded up
-constexpr std::uint64_t max_bytes = std::uint64_t{1} << 50U;
-
-struct TypeName {
-  std::string_view name;
-  NumberType type;
-};
-constexpr std::array type_names = {
-    TypeName{"int8", NumberType::int8},
-    TypeName{"uint8", NumberType::uint8},
-    TypeName{"int16", NumberType::int16},
-    TypeName{"uint16", NumberType::uint16},
-    TypeName{"int32", NumberType::int32},
-    TypeName{"uint32", NumberType::uint32},
-    TypeName{"int64", NumberType::int64},
-    TypeName{"uint64", NumberType::uint64},
-    TypeName{"float32", NumberType::float32},
-    TypeName{"float64", NumberType::float64},
-    TypeName{"int8_t", NumberType::int8},
-    TypeName{"signed char", NumberType::int8},
-    TypeName{"uint8_t", NumberType::uint8},
-    TypeName{"uchar", NumberType::uint8},
-    TypeName{"unsigned char", NumberType::uint8},
-    TypeName{"int16_t", NumberType::int16},
-    TypeName{"short", NumberType::int16},
-    TypeName{"short int", NumberType::int16},
-    TypeName{"signed short", NumberType::int16},
-    TypeName{"signed short int", NumberType::int16},
-    TypeName{"uint16_t", NumberType::uint16},
-    TypeName{"ushort", NumberType::uint16},
-    TypeName{"unsigned short", NumberType::uint16},
-    TypeName{"unsigned short int", NumberType::uint16},
-    TypeName{"int32_t", NumberType::int32},
-    TypeName{"int", NumberType::int32},
-    TypeName{"signed int", NumberType::int32},
-    TypeName{"uint32_t", NumberType::uint32},
-    TypeName{"uint", NumberType::uint32},
-    TypeName{"unsigned int", NumberType::uint32},
-    TypeName{"int64_t", NumberType::int64},
-    TypeName{"longlong", NumberType::int64},
-    TypeName{"long long", NumberType::int64},
-    TypeName{"long long int", NumberType::int64},
-    TypeName{"signed long long", NumberType::int64},
-    TypeName{"signed long long int", NumberType::int64},
-    TypeName{"uint64_t", NumberType::uint64},
-    TypeName{"ulonglong", NumberType::uint64},
-    TypeName{"unsigned long long", NumberType::uint64},
-    TypeName{"unsigned long long int", NumberType::uint64},
-    TypeName{"float", NumberType::float32},
-    TypeName{"double", NumberType::float64},
-};
-
-/// Bytes of a content in pieces.
-class Pieces {
- public:
-  Pieces() = default;
-  Pieces(const Pieces&) = delete;
-  Pieces& operator=(const Pieces&) = delete;
-  virtual ~Pieces() = default;
-  /// Returns the number of bytes written, which is smaller only at the end.
-  virtual std::size_t read(char* to, std::size_t count) = 0;
-};
-
-class PlainPieces final : public Pieces {
- public:
-  PlainPieces(ByteSource& content, std::uint64_t position) : content_(content), position_(position) {}
-  std::size_t read(char* to, std::size_t count) override {
-    const std::size_t got = content_.read(position_, to, count);
-    position_ += got;
-    return got;
-  }
-
- private:
-  ByteSource& content_;
-  std::uint64_t position_;
-};
-
-/// Decodes gzip or zlib data.
-class GzipPieces final : public Pieces {
- public:
-  GzipPieces(ByteSource& content, std::uint64_t position) : from_(content, position), input_(piece_bytes) {
-    constexpr int any_header = 32;
-    if (inflateInit2(&zip_, MAX_WBITS + any_header) != Z_OK) throw std::bad_alloc();
-  }
-  GzipPieces(const GzipPieces&) = delete;
-  GzipPieces& operator=(const GzipPieces&) = delete;
-  ~GzipPieces() override { inflateEnd(&zip_); }
-
-  std::size_t read(char* to, std::size_t count) override {
-    zip_.next_out = reinterpret_cast<Bytef*>(to);
-    zip_.avail_out = static_cast<uInt>(count);
-    while (zip_.avail_out > 0 && !ended_) {
-      if (zip_.avail_in == 0) {
-        zip_.next_in = input_.data();
-        zip_.avail_in = static_cast<uInt>(from_.read(reinterpret_cast<char*>(input_.data()), input_.size()));
-        if (zip_.avail_in == 0) break;
-      }
-      const int status = inflate(&zip_, Z_NO_FLUSH);
-      ended_ = status == Z_STREAM_END;
-      if (status != Z_OK && !ended_) fail("the file is damaged: its compressed values cannot be decoded");
-    }
-    return count - zip_.avail_out;
-  }
-
- private:
-  PlainPieces from_;
-  std::vector<Bytef> input_;
-  z_stream zip_{};
-  bool ended_ = false;
-};
-
-/// Decodes the zlib blocks of VTK: the number of blocks, the size of a block, that of the last one (0: a whole one),
-/// the compressed size of each block, and the blocks.
-class VtkPieces final : public Pieces {
- public:
-  VtkPieces(ByteSource& content, const ArrayField& field)
-      : content_(content), field_(field), next_table_(field.first_byte) {
-    const std::uint64_t blocks = number();
-    block_bytes_ = number();
-    const std::uint64_t last_bytes = number();
-    if (blocks > content.size() || block_bytes_ > max_block) fail(damaged);
-    next_block_ = next_table_ + blocks * field.table_number_bytes;
-    left_ = blocks;
-    last_bytes_ = last_bytes == 0 ? block_bytes_ : last_bytes;
-  }
-
-  std::size_t read(char* to, std::size_t count) override {
-    std::size_t done = 0;
-    while (done < count) {
-      if (at_ == block_.size()) {
-        if (left_ == 0) break;
-        decode_next();
-      }
-      const std::size_t bytes = std::min(count - done, block_.size() - at_);
-      std::memcpy(to + done, block_.data() + at_, bytes);
-      at_ += bytes;
-      done += bytes;
-    }
-    return done;
-  }
-
- private:
-  static constexpr const char* damaged = "the file is damaged: its compressed values cannot be decoded";
-  static constexpr std::uint64_t max_block = std::uint64_t{1} << 30U;
-
-  std::uint64_t number() {
-    std::array<char, 8> raw{};
-    const std::size_t bytes = field_.table_number_bytes;
-    if (next_table_ > content_.size() || content_.read(next_table_, raw.data(), bytes) < bytes) fail(end_of_file);
-    next_table_ += bytes;
-    std::uint64_t number = 0;
-    for (std::size_t i = 0; i < bytes; ++i) {
-      const std::size_t from = field_.big_endian ? i : bytes - 1 - i;
-      number = number << 8U | static_cast<std::uint8_t>(raw.at(from));
-    }
-    return number;
-  }
-
-  void decode_next() {
-    const std::uint64_t bytes = number();
-    if (next_block_ > content_.size() || bytes > content_.size() - next_block_) fail(end_of_file);
-    std::vector<char> packed(static_cast<std::size_t>(bytes));
-    if (content_.read(next_block_, packed.data(), packed.size()) < packed.size()) fail(end_of_file);
-    next_block_ += bytes;
-    --left_;
-    const std::uint64_t wanted = left_ == 0 ? last_bytes_ : block_bytes_;
-    if (wanted == 0 || wanted > max_block || wanted / max_expansion > bytes) fail(damaged);
-    block_.resize(static_cast<std::size_t>(wanted));
-    at_ = 0;
-    auto size = static_cast<uLongf>(block_.size());
-    const int status = uncompress(reinterpret_cast<Bytef*>(block_.data()), &size,
-                                  reinterpret_cast<const Bytef*>(packed.data()), static_cast<uLong>(packed.size()));
-    if (status != Z_OK || size != block_.size()) fail(damaged);
-  }
-
-  ByteSource& content_;
-  const ArrayField& field_;
-  std::uint64_t next_table_;
-  std::uint64_t next_block_ = 0;
-  std::uint64_t left_ = 0;  // blocks
-  std::uint64_t block_bytes_ = 0;
-  std::uint64_t last_bytes_ = 0;
-  std::vector<char> block_;
-  std::size_t at_ = 0;  // in the block
-};
-
-std::unique_ptr<Pieces> open_pieces(ByteSource& content, const ArrayField& field) {
-  if (field.encoding == ArrayEncoding::gzip) return std::make_unique<GzipPieces>(content, field.first_byte);
-  if (field.encoding == ArrayEncoding::vtk_zlib) return std::make_unique<VtkPieces>(content, field);
-  return std::make_unique<PlainPieces>(content, field.first_byte);
-}
 
 template <class T>
 float number_at(const char* bytes, bool swapped) {
@@ -251,48 +56,88 @@ Convert converter_of(NumberType type) {
   fail("the file is truncated: it has " + std::to_string(available) + " of " + std::to_string(wanted) + " values");
 }
 
-void read_binary(Pieces& pieces, const ArrayField& field, std::vector<float>& numbers, ProgressPart& part) {
+/// Appends `count` numbers.
+void read_binary(Pieces& pieces, const ArrayField& field, std::uint64_t count, std::vector<float>& numbers,
+                 ProgressPart& part) {
   const std::size_t each = size_of(field.type);
   const bool swapped = field.big_endian != (std::endian::native == std::endian::big);
   const Convert convert = converter_of(field.type);
-  const std::uint64_t count = field.numbers();
   std::vector<char> piece(piece_bytes);
-  while (numbers.size() < count) {
-    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(count - numbers.size(), piece.size() / each));
+  for (std::uint64_t done = 0; done < count;) {
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(count - done, piece.size() / each));
     const std::size_t got = pieces.read(piece.data(), wanted * each) / each;
     for (std::size_t i = 0; i < got; ++i) numbers.push_back(convert(piece.data() + i * each, swapped));
-    if (got < wanted) fail_truncated(count, numbers.size());
+    done += got;
+    if (got < wanted) fail_truncated(count, done);
     part.add(got);
   }
 }
 
-void read_text(Pieces& pieces, const ArrayField& field, std::vector<float>& numbers, ProgressPart& part) {
-  const std::uint64_t count = field.numbers();
+/// Appends `count` numbers.
+void read_text(Pieces& pieces, std::uint64_t count, std::vector<float>& numbers, ProgressPart& part) {
   const auto is_blank = [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == ','; };
   std::string text;
   std::vector<char> piece(piece_bytes);
-  for (bool ended = false; !ended && numbers.size() < count;) {
+  std::uint64_t done = 0;
+  for (bool ended = false; !ended && done < count;) {
     const std::size_t got = pieces.read(piece.data(), piece.size());
     ended = got < piece.size();
     text.append(piece.data(), got);
     std::size_t at = 0;
-    while (numbers.size() < count) {
+    while (done < count) {
       while (at < text.size() && is_blank(text[at])) ++at;
       std::size_t end = at;
       while (end < text.size() && !is_blank(text[end])) ++end;
       if (end == at || (end == text.size() && !ended)) break;  // the rest of the word is in the next piece
-      float number = 0.0F;
+      double number = 0.0;                                     // also holds what is too small for a float
       const auto [last, error] = number_from_chars(text.data() + at, text.data() + end, number);
       if (error != std::errc{} || last != text.data() + end)
         fail("cannot read the value '" + one_line(text.substr(at, end - at), 60) + "'");
-      numbers.push_back(number);
+      numbers.push_back(static_cast<float>(number));
+      ++done;
       at = end;
     }
     text.erase(0, at);
     if (text.size() > piece_bytes) fail("its values are not text");
     part.add(got);
   }
-  if (numbers.size() < count) fail_truncated(count, numbers.size());
+  if (done < count) fail_truncated(count, done);
+}
+
+/// Throws if a content cannot have so many numbers, before memory is allocated for them.
+void check_room(const ByteSource& content, const ArrayField& field, std::uint64_t count) {
+  if (const std::uint64_t most = max_numbers(content, field); count > most) fail_truncated(count, most);
+}
+
+/// Appends `count` numbers of a content.
+void append_numbers(ByteSource& content, const ArrayField& field, std::uint64_t count, std::vector<float>& numbers,
+                    Progress* progress, Portion portion) {
+  const bool text = field.encoding == ArrayEncoding::text;
+  ProgressPart part(progress, portion.from, portion.to, text ? content.size() : count);
+  const std::unique_ptr<Pieces> pieces = open_pieces(content, field, count);
+  if (text) {
+    read_text(*pieces, count, numbers, part);
+  } else {
+    read_binary(*pieces, field, count, numbers, part);
+  }
+  if (field.encoding == ArrayEncoding::gzip) {
+    char rest = 0;
+    static_cast<void>(pieces->read(&rest, 1));  // compares the checksum behind the values
+  }
+}
+
+/// Calls visit with each of the field's files. Errors begin with the file's name.
+template <class Visit>
+void for_each_file(const ArrayField& field, const Visit& visit) {
+  for (std::size_t i = 0; i < field.files.size(); ++i) {
+    try {
+      visit(*open_file(field.files[i]), i);
+    } catch (const Error&) {
+      throw;
+    } catch (const std::runtime_error& cause) {
+      fail('"' + one_line(field.files[i].filename().string()) + "\": " + cause.what());
+    }
+  }
 }
 
 /// A file with arrays. The values of a grid are read with it, and kept for the sweeps over it.
@@ -371,47 +216,22 @@ class ArrayReader final : public Reader {
 
 }  // namespace
 
-std::optional<NumberType> number_type_of(std::string_view name) {
-  for (const TypeName& type : type_names)
-    if (type.name == name) return type.type;
-  return std::nullopt;
-}
-
-const char* name_of(NumberType type) { return std::ranges::find(type_names, type, &TypeName::type)->name.data(); }
-
-std::size_t size_of(NumberType type) {
-  constexpr std::array<std::size_t, 10> sizes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
-  return sizes.at(static_cast<std::size_t>(type));
-}
-
-void check_array_size(const ArrayField& field) {
-  if (glm::any(glm::lessThan(field.size, glm::ivec3(1))) ||
-      glm::any(glm::greaterThan(field.size, glm::ivec3(max_side))))
-    fail("its size is " + to_string(field.size) + "; each side is from 1 to " + std::to_string(max_side));
-}
-
 std::vector<float> read_numbers(ByteSource& content, const ArrayField& field, Progress* progress, Portion portion) {
-  const std::uint64_t count = field.numbers();
-  const std::uint64_t bytes = content.size() - std::min(content.size(), field.first_byte);
-  // Sizes that the content cannot have are refused before memory is allocated.
-  std::uint64_t most = bytes;
-  if (field.encoding == ArrayEncoding::raw) most = bytes / size_of(field.type);
-  if (field.encoding == ArrayEncoding::gzip || field.encoding == ArrayEncoding::vtk_zlib)
-    most = std::min(bytes, max_bytes) * max_expansion / size_of(field.type);
-  if (count > most) fail_truncated(count, most);
-  ProgressPart part(progress, portion.from, portion.to, field.encoding == ArrayEncoding::text ? bytes : count);
   std::vector<float> numbers;
-  numbers.reserve(static_cast<std::size_t>(count));
-  const std::unique_ptr<Pieces> pieces = open_pieces(content, field);
-  if (field.encoding == ArrayEncoding::text) {
-    read_text(*pieces, field, numbers, part);
-  } else {
-    read_binary(*pieces, field, numbers, part);
+  if (field.files.empty()) {
+    check_room(content, field, field.numbers());
+    numbers.reserve(static_cast<std::size_t>(field.numbers()));
+    append_numbers(content, field, field.numbers(), numbers, progress, portion);
+    return numbers;
   }
-  if (field.encoding == ArrayEncoding::gzip) {
-    char rest = 0;
-    static_cast<void>(pieces->read(&rest, 1));  // compares the checksum behind the values
-  }
+  const std::uint64_t count = field.numbers() / field.files.size();
+  for_each_file(field, [&](ByteSource& file, std::size_t) { check_room(file, field, count); });
+  numbers.reserve(static_cast<std::size_t>(field.numbers()));
+  const double files = static_cast<double>(field.files.size());
+  for_each_file(field, [&](ByteSource& file, std::size_t i) {
+    const auto at = static_cast<double>(i);
+    append_numbers(file, field, count, numbers, progress, portion.part(at / files, (at + 1.0) / files));
+  });
   return numbers;
 }
 

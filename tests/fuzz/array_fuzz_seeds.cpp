@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fuzz/seed_folder.hpp"
+#include "support/base64.hpp"
 
 namespace {
 
@@ -41,12 +42,17 @@ std::string number(std::size_t value) {
   return text;
 }
 
-std::string vti(const std::string& compressor, const std::string& data) {
-  return "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\" header_type=\"UInt32\"" + compressor +
+/// attributes: of <VTKFile>. format: of the array. values: between its tags. after: behind <ImageData>.
+std::string vti(const std::string& attributes, const std::string& format, const std::string& values,
+                const std::string& after = "") {
+  return "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\" header_type=\"UInt32\"" + attributes +
          "><ImageData WholeExtent=\"0 8 0 8 0 8\" Origin=\"0 0 0\" Spacing=\"1 1 2\"><Piece Extent=\"0 8 0 8 0 8\">"
-         "<PointData><DataArray type=\"UInt8\" Name=\"density\" format=\"appended\" offset=\"0\"/></PointData>"
-         "</Piece></ImageData><AppendedData encoding=\"raw\">_" +
-         data + "</AppendedData></VTKFile>";
+         "<PointData><DataArray type=\"UInt8\" Name=\"density\" format=" +
+         format + ">" + values + "</DataArray></PointData></Piece></ImageData>" + after + "</VTKFile>";
+}
+
+std::string appended(const std::string& encoding, const std::string& data) {
+  return "<AppendedData encoding=\"" + encoding + "\">_" + data + "</AppendedData>";
 }
 
 /// Writes a stack of two pages. tile: side of tiles; 0: strips.
@@ -100,10 +106,17 @@ int main(int argc, char** argv) {
   std::string text;
   for (const char value : values) text += std::to_string(static_cast<int>(value)) + ' ';
   folder.write("ascii.nrrd", nrrd + "encoding: ascii\n\n" + text);
-  folder.write("raw.vti", vti("", number(values.size()) + values));
+  const std::string zlib = " compressor=\"vtkZLibDataCompressor\"";
+  const std::string first = "\"appended\" offset=\"0\"";
+  const std::string counted = number(values.size()) + values;
+  folder.write("raw.vti", vti("", first, "", appended("raw", counted)));
+  folder.write("inline.vti", vti("", "\"binary\"", cumulet::test::base64(counted)));
+  folder.write("ascii.vti", vti("", "\"ascii\"", text));
   const std::string block = packed(values, false);
-  folder.write("zlib.vti", vti(" compressor=\"vtkZLibDataCompressor\"",
-                               number(1) + number(values.size()) + number(0) + number(block.size()) + block));
+  const std::string table = number(1) + number(values.size()) + number(0) + number(block.size());
+  folder.write("zlib.vti", vti(zlib, first, "", appended("raw", table + block)));
+  folder.write("base64.vti",
+               vti(zlib, first, "", appended("base64", cumulet::test::base64(table) + cumulet::test::base64(block))));
   const auto tiff = [&](const char* name) { return (folder.path() / name).string(); };
   write_tiff(tiff("plain.tif"), "wl", 8, COMPRESSION_NONE, 1, 0);
   write_tiff(tiff("lzw.tif"), "wb", 16, COMPRESSION_LZW, 2, 0);

@@ -1,4 +1,4 @@
-// NRRD files, VTK images, and raw files with a JSON description, as volumes.
+// NRRD files, and raw files with a JSON description, as volumes.
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -6,16 +6,14 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/error.hpp"
-#include "support/folder.hpp"
-#include "support/volumes.hpp"
-#include "volume/array_file.hpp"
+#include "support/array_files.hpp"
 #include "volume/frame_import.hpp"
 #include "volume/inspection.hpp"
 
@@ -23,29 +21,12 @@ namespace {
 
 using namespace cumulet;
 using glm::ivec3;
-using test::value_at;
+using test::bytes_of;
+using test::in_grid;
+using test::value_of;
 using volume::ScalarVolume;
 
-constexpr ivec3 size{5, 4, 3};
-const std::string in_grid = "grid \"density\": ";
-
-float value_of(const ivec3& at) { return static_cast<float>(1 + at.x + 10 * at.y + 50 * at.z); }
-
-template <class T>
-std::string bytes_of(bool swapped = false) {
-  std::string bytes;
-  for (int z = 0; z < size.z; ++z) {
-    for (int y = 0; y < size.y; ++y) {
-      for (int x = 0; x < size.x; ++x) {
-        const T value = static_cast<T>(value_of({x, y, z}));
-        std::array<char, sizeof(T)> raw{};
-        std::memcpy(raw.data(), &value, sizeof value);
-        bytes.append(swapped ? std::string(raw.rbegin(), raw.rend()) : std::string(raw.begin(), raw.end()));
-      }
-    }
-  }
-  return bytes;
-}
+class ArrayFile : public test::ArrayFile {};
 
 std::string gzipped(const std::string& bytes) {
   z_stream zip{};
@@ -65,40 +46,6 @@ std::string gzipped(const std::string& bytes) {
 std::string nrrd(const std::string& fields, const std::string& data, const std::string& sizes = "5 4 3") {
   return "NRRD0004\n# made by a test\ndimension: 3\nsizes: " + sizes + "\n" + fields + "\n" + data;
 }
-
-class ArrayFile : public testing::Test {
- protected:
-  std::string write(const std::string& name, const std::string& content) const {
-    const std::string file = (folder_ / name).string();
-    std::ofstream(file, std::ios::binary) << content;
-    return file;
-  }
-  static ScalarVolume read(const std::string& file) { return volume::import_volume(file, "", {}); }
-  /// The cause of a failure, without the file's name.
-  [[nodiscard]] std::string refusal(const std::string& content, const std::string& name = "bad.nrrd") const {
-    const std::string file = write(name, content);
-    try {
-      read(file);
-    } catch (const Error& error) {
-      const std::string line = error.what();
-      EXPECT_EQ(line.rfind(file + ": ", 0), 0U) << line;
-      EXPECT_EQ(line.find('\n'), std::string::npos) << line;
-      EXPECT_EQ(error.code(), ErrorCode::file);
-      return line.substr(file.size() + 2);
-    }
-    return "no error";
-  }
-  static void expect_values(const ScalarVolume& got) {
-    EXPECT_EQ(got.active_voxels, 60U);
-    for (int z = 0; z < size.z; ++z) {
-      for (int y = 0; y < size.y; ++y) {
-        for (int x = 0; x < size.x; ++x) ASSERT_EQ(value_at(got, {x, y, z}), value_of({x, y, z}));
-      }
-    }
-  }
-
-  test::Folder folder_;
-};
 
 TEST_F(ArrayFile, NrrdValuesOfEachTypeAndEncoding) {
   const auto expect = [&](const std::string& fields, const std::string& data) {
@@ -198,92 +145,6 @@ TEST_F(ArrayFile, BadNrrdIsOneLine) {
   std::string damaged = gzipped(data);
   damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] ^ 0x55);
   EXPECT_NE(refusal(nrrd("type: uint8\nencoding: gzip\n", damaged)), "no error");
-}
-
-// ---- VTK ----
-
-std::string number_bytes(std::uint64_t number, std::size_t bytes) {
-  std::string text;
-  for (std::size_t i = 0; i < bytes; ++i) text += static_cast<char>(number >> (8 * i) & 0xFFU);
-  return text;
-}
-
-std::string zlib_block(const std::string& bytes) {
-  std::string out(compressBound(bytes.size()), '\0');
-  uLongf size_of_out = out.size();
-  EXPECT_EQ(compress(reinterpret_cast<Bytef*>(out.data()), &size_of_out, reinterpret_cast<const Bytef*>(bytes.data()),
-                     bytes.size()),
-            Z_OK);
-  out.resize(size_of_out);
-  return out;
-}
-
-/// An array in blocks of 64 bytes.
-std::string in_blocks(const std::string& bytes) {
-  constexpr std::size_t block = 64;
-  std::string table;
-  std::string blocks;
-  const std::size_t count = (bytes.size() + block - 1) / block;
-  table += number_bytes(count, 8) + number_bytes(block, 8) + number_bytes(bytes.size() % block, 8);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::string packed = zlib_block(bytes.substr(i * block, block));
-    table += number_bytes(packed.size(), 8);
-    blocks += packed;
-  }
-  return table + blocks;
-}
-
-std::string vti(const std::string& file, const std::string& arrays, const std::string& data,
-                const std::string& extent = "2 6 0 3 0 2") {
-  return "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\" " + file +
-         ">\n <ImageData WholeExtent=\"" + extent + "\" Origin=\"1 2 3\" Spacing=\"0.5 2 1\">\n" +
-         "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" format=\"ascii\">1</DataArray></FieldData>" +
-         "  <Piece Extent=\"" + extent + "\">" + arrays + "</Piece></ImageData>\n<AppendedData encoding=\"raw\">\n _" +
-         data + "\n</AppendedData></VTKFile>";
-}
-
-TEST_F(ArrayFile, VtkImagesHavePointsAndCells) {
-  const std::string floats = bytes_of<float>();
-  const std::string first = "junk" + number_bytes(floats.size(), 4) + floats;
-  const std::string points =
-      "<PointData Scalars='density'><DataArray type=\"Float32\" Name=\"density\" "
-      "format=\"appended\" offset=\"4\"/></PointData>";
-  ScalarVolume got = read(write("a.vti", vti("header_type=\"UInt32\"", points, first)));
-  expect_values(got);
-  EXPECT_EQ(got.index_to_world, glm::dmat4(0.5, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 2, 2, 3, 1));
-
-  const std::string cells =
-      "<CellData><DataArray type=\"UInt16\" Name=\"density\" NumberOfComponents=\"1\" "
-      "format=\"appended\" offset=\"0\"></DataArray></CellData>";
-  const std::string file = write("b.vti", vti("header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\"", cells,
-                                              in_blocks(bytes_of<std::uint16_t>()), "0 5 0 4 0 3"));
-  got = read(file);
-  expect_values(got);
-  EXPECT_EQ(got.index_to_world[3], glm::dvec4(1.25, 3, 3.5, 1));
-}
-
-TEST_F(ArrayFile, BadVtkImagesAreOneLine) {
-  const auto points = [](const std::string& attributes) {
-    return "<PointData><DataArray Name=\"density\" " + attributes + "/></PointData>";
-  };
-  const std::string zlib = "header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\"";
-  const std::string appended = points("type=\"UInt8\" format=\"appended\" offset=\"0\"");
-  EXPECT_EQ(refusal(vti("compressor=\"vtkLZ4DataCompressor\"", appended, "")),
-            "is compressed by vtkLZ4DataCompressor; vtkZLibDataCompressor is supported");
-  EXPECT_EQ(refusal(vti("", points("type=\"UInt8\" format=\"binary\""), "")),
-            "has an array in the format binary; only arrays that are appended as raw bytes are read");
-  EXPECT_EQ(refusal(vti("", points("type=\"String\" format=\"appended\" offset=\"0\""), "")),
-            "has no array of 1 or 3 components");
-  EXPECT_EQ(refusal(vti("", appended, "", "2 x 0 3 0 2")), "cannot read Extent=\"2 x 0 3 0 2\"");
-  EXPECT_EQ(refusal(vti("", appended, "", "2 1 0 3 0 2")), "its size is (0, 4, 3); each side is from 1 to 1048576");
-  EXPECT_EQ(refusal("<VTKFile type=\"PolyData\">"), "is a VTK file of the type PolyData, not ImageData");
-  EXPECT_EQ(refusal("<?xml?><VTKFile type=\"ImageData\"><PointData>" + appended),
-            "has no appended data; only arrays that are appended as raw bytes are read");
-  EXPECT_NE(refusal(vti(zlib, appended, in_blocks(bytes_of<std::uint8_t>()).substr(0, 30))), "no error");
-  std::string damaged = in_blocks(bytes_of<std::uint8_t>());
-  damaged[36] = static_cast<char>(damaged[36] ^ 0x55);
-  EXPECT_EQ(refusal(vti(zlib, appended, damaged)),
-            in_grid + "the file is damaged: its compressed values cannot be decoded");
 }
 
 TEST_F(ArrayFile, RawFilesHaveADescription) {
