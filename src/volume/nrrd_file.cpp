@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <system_error>
 #include <utility>
 
 #include "base/number_parsing.hpp"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r";
 constexpr std::size_t max_header = std::size_t{1} << 20U;
+constexpr std::uint64_t max_files = std::uint64_t{1} << 20U;
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(blanks);
@@ -69,6 +71,33 @@ std::vector<std::string_view> directions_of(std::string_view text) {
   return parts;
 }
 
+/// Returns the name of a file by a pattern as of printf, with one number.
+std::string name_by(std::string_view pattern, std::int64_t number) {
+  std::string name;
+  for (std::size_t at = 0, numbers = 0; at < pattern.size(); ++at) {
+    if (pattern[at] != '%') {
+      name += pattern[at];
+      continue;
+    }
+    if (pattern.substr(at, 2) == "%%") {
+      name += pattern[at++];
+      continue;
+    }
+    std::size_t width = 0;
+    const std::size_t end = std::min(pattern.find_first_not_of("0123456789", at + 1), pattern.size());
+    const std::string_view digits = pattern.substr(at + 1, end - at - 1);
+    if (!digits.empty()) width = number_of<std::uint8_t>(digits, "data file");
+    const bool is_number = end < pattern.size() && (pattern[end] == 'd' || pattern[end] == 'i' || pattern[end] == 'u');
+    if (!is_number || ++numbers > 1)
+      fail("has the pattern '" + one_line(pattern, 60) + "' in \"data file\", which is not one of one number");
+    const std::string text = std::to_string(number);
+    name.append(width - std::min(width, text.size()), digits.starts_with('0') ? '0' : ' ');
+    name += text;
+    at = end;
+  }
+  return name;
+}
+
 /// The header of a NRRD file.
 class NrrdHeader {
  public:
@@ -85,7 +114,13 @@ class NrrdHeader {
     };
     format_ = "NRRD " + std::string(line().value_or("").substr(4));
     std::optional<std::string_view> next = line();
-    for (; next && !next->empty(); next = line()) take(*next);
+    for (; next && !next->empty(); next = line()) {
+      if (is_list_) {
+        data_files_.emplace_back(*next);
+      } else {
+        take(*next);
+      }
+    }
     ends_ = next.has_value();
     if (!ends_ && text.size() == max_header) fail("the file is damaged: its header has no end");
     size_ = at;
@@ -99,8 +134,9 @@ class NrrdHeader {
     field.type = *type_;
     field.encoding = encoding_;
     field.big_endian = big_endian_;
-    const bool has_components = sizes_.size() == 4 && (sizes_[0] == 1 || sizes_[0] == 3);
-    if (sizes_.size() != 3 && !has_components)
+    const bool has_components = has_components_first();
+    const bool has_last = !has_components && sizes_.size() == 4 && sizes_[3] == 1;
+    if (sizes_.size() != 3 && !has_components && !has_last)
       fail("has " + std::to_string(sizes_.size()) + " axes; 3 are read, and before them an axis of 1 or 3 components");
     const std::size_t first = has_components ? 1 : 0;
     if (has_components) field.components = sizes_[0];
@@ -116,15 +152,37 @@ class NrrdHeader {
       }
     }
     if (origin_) field.index_to_world[3] = glm::dvec4(*origin_, 1.0);
+    field.first_byte = data_file_.empty() ? size_ : 0;
+    field.skipped_lines = line_skip_;
+    field.skipped_bytes = byte_skip_;
+    if (byte_skip_ < 0 && encoding_ == ArrayEncoding::text) fail("has a negative \"byte skip\" and is ascii");
     return field;
   }
 
-  [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// Returns the names of the files that hold the values, in order; none if they are behind the header.
+  [[nodiscard]] std::vector<std::string> data_files() const {
+    const std::vector<std::string_view> words = words_of(data_file_);
+    if (is_list_) {
+      check_files(data_files_.size(), words.size() > 1 ? words[1] : "");
+      return data_files_;
+    }
+    // NAME%d.raw FIRST LAST STEP [SUBDIM]
+    const bool is_pattern = (words.size() == 4 || words.size() == 5) && words[0].find('%') != std::string_view::npos;
+    if (!is_pattern) return data_file_.empty() ? std::vector<std::string>{} : std::vector{data_file_};
+    const std::int64_t first = number_of<std::int32_t>(words[1], data_file_key);
+    const std::int64_t last = number_of<std::int32_t>(words[2], data_file_key);
+    const std::int64_t step = number_of<std::int32_t>(words[3], data_file_key);
+    if (step == 0) fail("has the step 0 in \"data file\"");
+    const bool reaches = step > 0 ? first <= last : first >= last;
+    const std::int64_t count = reaches ? (last - first) / step + 1 : 0;
+    check_files(static_cast<std::uint64_t>(count), words.size() > 4 ? words[4] : "");
+    std::vector<std::string> names;
+    for (std::int64_t i = 0; i < count; ++i) names.push_back(name_by(words[0], first + i * step));
+    return names;
+  }
+
   [[nodiscard]] bool ends() const { return ends_; }
   [[nodiscard]] const std::string& format() const { return format_; }
-  [[nodiscard]] const std::string& data_file() const { return data_file_; }
-  [[nodiscard]] std::int64_t byte_skip() const { return byte_skip_; }
-  [[nodiscard]] std::uint64_t line_skip() const { return line_skip_; }
   [[nodiscard]] std::vector<Metadata> metadata() const { return metadata_; }
 
  private:
@@ -132,6 +190,34 @@ class NrrdHeader {
     std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(content.size(), max_header)), '\0');
     text.resize(content.read(0, text.data(), text.size()));
     return text;
+  }
+
+  static constexpr std::string_view data_file_key = "data file";
+
+  /// Returns whether an axis of 1 or 3 components is before those of space.
+  [[nodiscard]] bool has_components_first() const {
+    if (sizes_.size() == 3 && !kinds_.empty() && !is_of_space(kinds_[0]))
+      fail("has 2 axes and one of the kind '" + one_line(kinds_[0], 60) + "' before them; 3 axes are read");
+    return sizes_.size() == 4 && (sizes_[0] == 1 || sizes_[0] == 3) && (directions_.empty() || !directions_[0]);
+  }
+  static bool is_of_space(std::string_view kind) {
+    constexpr std::array<std::string_view, 6> kinds = {"domain", "space", "time", "list", "none", "???"};
+    return std::ranges::find(kinds, kind) != kinds.end();
+  }
+
+  /// Throws unless so many files can hold the array in equal parts. dimension: number of axes that a file has; empty:
+  /// all except the last one.
+  void check_files(std::uint64_t count, std::string_view dimension) const {
+    const std::size_t axes = sizes_.size();
+    const std::size_t within = dimension.empty() ? axes - 1 : number_of<std::size_t>(dimension, data_file_key);
+    if (count > max_files) fail("has more than " + std::to_string(max_files) + " data files");
+    if (within < 1 || within > axes) fail("has files of " + std::to_string(within) + " axes in \"data file\"");
+    std::uint64_t wanted = 1;  // each size is at most that of check_array_size
+    for (std::size_t axis = within; axis < axes; ++axis) wanted *= sizes_[axis];
+    if (within < axes ? count == wanted : count > 0 && sizes_.back() % count == 0) return;
+    const std::string number = "the number of its data files is " + std::to_string(count);
+    if (within < axes) fail(number + " in place of " + std::to_string(wanted));
+    fail(number + ", which does not divide its " + std::to_string(sizes_.back()) + " slices");
   }
 
   void take(std::string_view line) {
@@ -145,12 +231,13 @@ class NrrdHeader {
       if (line.ends_with(':')) return;
       fail("its header has the line '" + one_line(line, 60) + "', which is not a field");
     }
-    set(line.substr(0, colon), trimmed(line.substr(colon + 2)));
+    // Teem ignores the case of these words.
+    set(lower_case(std::string(line.substr(0, colon))), trimmed(line.substr(colon + 2)));
   }
 
   void set(std::string_view key, std::string_view value) {
     if (key == "type") {
-      type_ = number_type_of(value);
+      type_ = number_type_of(lower_case(std::string(value)));
       if (!type_) fail("has the type '" + one_line(value, 60) + "', which is not supported");
     } else if (key == "sizes") {
       for (const std::string_view word : words_of(value)) sizes_.push_back(number_of<std::uint64_t>(word, key));
@@ -165,15 +252,17 @@ class NrrdHeader {
     } else if (key == "kinds") {
       for (const std::string_view word : words_of(value)) kinds_.emplace_back(word);
     } else if (key == "encoding") {
-      set_encoding(value);
+      set_encoding(lower_case(std::string(value)));
     } else if (key == "endian") {
-      if (value != "little" && value != "big") fail("has the byte order '" + one_line(value, 60) + "'");
-      big_endian_ = value == "big";
-    } else if (key == "data file" || key == "datafile") {
+      const std::string order = lower_case(std::string(value));
+      if (order != "little" && order != "big") fail("has the byte order '" + one_line(value, 60) + "'");
+      big_endian_ = order == "big";
+    } else if (key == data_file_key || key == "datafile") {
       data_file_ = value;
+      const std::vector<std::string_view> words = words_of(value);
+      is_list_ = !words.empty() && words[0] == "LIST";
     } else if (key == "byte skip" || key == "byteskip") {
       byte_skip_ = number_of<std::int64_t>(value, key);
-      if (byte_skip_ < -1) fail("has a negative \"byte skip\"");
     } else if (key == "line skip" || key == "lineskip") {
       line_skip_ = number_of<std::uint64_t>(value, key);
     } else {
@@ -205,32 +294,24 @@ class NrrdHeader {
   ArrayEncoding encoding_ = ArrayEncoding::raw;
   bool big_endian_ = false;
   std::string data_file_;
+  bool is_list_ = false;
+  std::vector<std::string> data_files_;  // of a list
   std::int64_t byte_skip_ = 0;
   std::uint64_t line_skip_ = 0;
   std::vector<Metadata> metadata_;
 };
 
-/// Returns the position after so many lines.
-std::uint64_t skip_lines(ByteSource& content, std::uint64_t position, std::uint64_t lines) {
-  std::array<char, 4096> piece{};
-  while (lines > 0) {
-    const std::size_t got = content.read(std::min(position, content.size()), piece.data(), piece.size());
-    if (got == 0) fail(end_of_file);
-    for (std::size_t i = 0; i < got && lines > 0; ++i) {
-      ++position;
-      if (piece.at(i) == '\n') --lines;
-    }
-  }
-  return position;
-}
-
-std::unique_ptr<ByteSource> open_detached(const std::string& name, const std::optional<std::filesystem::path>& folder) {
+/// Returns the path of a file with values. Throws if it cannot be read.
+std::filesystem::path detached(const std::string& name, const std::optional<std::filesystem::path>& folder) {
   const std::string quoted = '"' + one_line(name) + "\"";
-  if (name.starts_with("LIST") || name.find('%') != std::string::npos)
-    fail("has its values in several files (" + quoted + "), which is not supported");
   if (!folder) fail("has its values in the file " + quoted + ", but the data has no folder");
   try {
-    return open_file(*folder / name);
+    std::filesystem::path file = *folder / name;
+    std::error_code error;
+    const std::filesystem::file_status status = std::filesystem::status(file, error);
+    if (exists(status) && !is_regular_file(status)) fail("is not a regular file");
+    open_file(file);
+    return file;
   } catch (const std::runtime_error& cause) {
     fail("has its values in the file " + quoted + ": " + cause.what());
   }
@@ -243,21 +324,8 @@ std::unique_ptr<Reader> open_nrrd(std::unique_ptr<ByteSource> content,
   const NrrdHeader header(*content);
   ArrayField field = header.field();
   check_array_size(field);
-  if (header.data_file().empty()) {
-    if (!header.ends()) fail(end_of_file);
-    field.first_byte = header.size();
-  } else {
-    content = open_detached(header.data_file(), folder);
-  }
-  field.first_byte = skip_lines(*content, field.first_byte, header.line_skip());
-  if (header.byte_skip() >= 0) {
-    field.first_byte += static_cast<std::uint64_t>(header.byte_skip());
-  } else {
-    // The values are the last bytes of the file.
-    const std::uint64_t bytes = field.numbers() * size_of(field.type);
-    if (field.encoding != ArrayEncoding::raw) fail("has \"byte skip: -1\" and an encoding other than raw");
-    field.first_byte = content->size() - std::min(content->size(), bytes);
-  }
+  for (const std::string& name : header.data_files()) field.files.push_back(detached(name, folder));
+  if (field.files.empty() && !header.ends()) fail(end_of_file);
   return make_array_reader(header.format(), {std::move(field)}, header.metadata(), std::move(content), progress);
 }
 

@@ -1,6 +1,7 @@
 // NRRD files, and raw files with a JSON description, as volumes.
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <zlib.h>
 
 #include <array>
@@ -63,7 +64,7 @@ TEST_F(ArrayFile, NrrdValuesOfEachTypeAndEncoding) {
   std::string text;
   for (int i = 0; i < 60; ++i)
     text += std::to_string(value_of({i % 5, i / 5 % 4, i / 20})) + (i % 5 == 4 ? "\r\n" : " ");
-  expect("type: float\nencoding: ascii\n", text);
+  expect("Type: Float\nEncoding: ASCII\n", text);
   expect("type: uint8\nencoding: raw\nbyte skip: 3\n", "xyz" + bytes_of<std::uint8_t>());
   expect("type: uint8\nencoding: raw\nline skip: 2\n", "a\nb\n" + bytes_of<std::uint8_t>());
   expect("type: uint8\nencoding: raw\nbyte skip: -1\n", "anything" + bytes_of<std::uint8_t>());
@@ -115,6 +116,112 @@ TEST_F(ArrayFile, NrrdHasDetachedValuesAndVectors) {
   EXPECT_EQ(inspection.format(), "NRRD 0004");
   ASSERT_TRUE(inspection.statistics(0).values);
   EXPECT_EQ(inspection.statistics(0).values->max, 7.0F);
+}
+
+// ---- Values in several files ----
+
+/// A header for three files of bytes, one for each slice.
+std::string slices(const std::string& data_file, const std::string& encoding = "raw") {
+  return "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 5 4 3\nencoding: " + encoding + "\n" + data_file;
+}
+
+std::string slice(std::size_t z) { return bytes_of<std::uint8_t>().substr(20 * z, 20); }
+
+TEST_F(ArrayFile, NrrdHasValuesInSeveralFiles) {
+  const auto expect = [&](const std::string& header) {
+    SCOPED_TRACE(header);
+    expect_values(read(write("a.nhdr", header)));
+  };
+  for (const std::size_t z : {0, 1, 2}) {
+    write("s" + std::to_string(7 + z) + ".raw", slice(z));
+    write("s" + std::to_string(7 + z) + ".gz", gzipped(slice(z)));
+    write("padded0" + std::to_string(18 - 2 * z), "line\n\nxyz" + slice(z));
+    write("100%_" + std::string(1, ' ') + std::to_string(z), slice(z));
+    std::string text;
+    for (const char value : slice(z)) text += std::to_string(static_cast<unsigned char>(value)) + " ";
+    write("text" + std::to_string(z), text);
+  }
+  expect(slices("data file: s%d.raw 7 9 1\n"));
+  expect(slices("datafile: s%01i.raw 7 9 1 2"));
+  expect(slices("data file: s%d.gz 7 9 1\n", "gzip"));
+  expect(slices("data file: text%u 0 2 1\n", "ascii"));
+  expect(slices("line skip: 2\nbyte skip: 3\ndata file: padded%03d 18 14 -2\n"));
+  expect(slices("byte skip: -1\ndata file: padded%03d 18 14 -2\n"));
+  expect(slices("data file: LIST\ns7.raw\ns8.raw\r\ns9.raw\n"));
+  expect(slices("data file: LIST\n100%_ 0\n100%_ 1\n" + (folder_ / "100%_ 2").string()));
+  write("all", bytes_of<std::uint8_t>());
+  expect(slices("data file: LIST 3\nall\n"));
+  expect(slices("data file: all\n"));
+  // One file for each row.
+  for (std::size_t row = 0; row < 12; ++row) {
+    write("row" + std::to_string(row), bytes_of<std::uint8_t>().substr(5 * row, 5));
+  }
+  expect(slices("data file: row%d 0 11 1 1\n"));
+}
+
+TEST_F(ArrayFile, BadListsOfFilesAreOneLine) {
+  const auto cause = [&](const std::string& header) { return refusal(header, "bad.nhdr"); };
+  for (const std::size_t z : {0, 1}) write("s" + std::to_string(z), slice(z));
+  const std::string missing = "has its values in the file \"s2\": No such file or directory";
+  EXPECT_EQ(cause(slices("data file: s%d 0 2 1\n")), missing);
+  EXPECT_EQ(cause(slices("data file: LIST\ns0\ns1\ns2\n")), missing);
+  EXPECT_EQ(cause(slices("data file: s%d 0 3 1\n")), "the number of its data files is 4 in place of 3");
+  EXPECT_EQ(cause(slices("data file: s%d 2 0 1\n")), "the number of its data files is 0 in place of 3");
+  EXPECT_EQ(cause(slices("data file: s%d 5 4 2 3\n")),
+            "the number of its data files is 0, which does not divide its 3 slices");
+  EXPECT_EQ(cause(slices("data file: s%d -2147483648 2147483647 1 3\n")), "has more than 1048576 data files");
+  EXPECT_EQ(cause(slices("data file: LIST\ns0\n")), "the number of its data files is 1 in place of 3");
+  EXPECT_EQ(cause(slices("data file: LIST 3\ns0\ns1\n")),
+            "the number of its data files is 2, which does not divide its 3 slices");
+  EXPECT_EQ(cause(slices("data file: LIST 4\ns0\n")), "has files of 4 axes in \"data file\"");
+  EXPECT_EQ(cause(slices("data file: s%d 0 2 0\n")), "has the step 0 in \"data file\"");
+  EXPECT_EQ(cause(slices("data file: s%d 0 two 1\n")), "cannot read 'two' in \"data file\"");
+  for (const char* pattern : {"s%s", "s%", "s%d%d", "s%12", "s%*d"}) {
+    EXPECT_EQ(cause(slices("data file: " + std::string(pattern) + " 0 2 1\n")),
+              "has the pattern '" + std::string(pattern) + "' in \"data file\", which is not one of one number");
+  }
+  EXPECT_EQ(cause(slices("data file: s%999d 0 2 1\n")), "cannot read '999' in \"data file\"");
+  write("s2", slice(2).substr(1));
+  EXPECT_EQ(cause(slices("data file: s%d 0 2 1\n")), in_grid + "\"s2\": the file is truncated: it has 19 of 20 values");
+  std::filesystem::create_directory(folder_ / "folder");
+  EXPECT_EQ(cause(slices("data file: folder\n")), "has its values in the file \"folder\": is not a regular file");
+  // It would wait for a writer.
+  ASSERT_EQ(mkfifo((folder_ / "fifo").c_str(), 0600), 0);
+  EXPECT_EQ(cause(slices("data file: fifo\n")), "has its values in the file \"fifo\": is not a regular file");
+}
+
+TEST_F(ArrayFile, NrrdSkipsDecodedBytes) {
+  const std::string bytes = bytes_of<std::uint8_t>();
+  const auto expect = [&](const std::string& fields, const std::string& data) {
+    SCOPED_TRACE(fields);
+    expect_values(read(write("a.nrrd", nrrd("type: uint8\n" + fields, data))));
+  };
+  expect("encoding: gzip\nbyte skip: 4\n", gzipped("head" + bytes));
+  expect("encoding: gzip\nbyte skip: -1\n", gzipped("some head" + bytes));
+  expect("encoding: gzip\nline skip: 1\nbyte skip: -4\n", "text\n" + gzipped("some head" + bytes + "end"));
+  expect("encoding: raw\nbyte skip: -4\n", "some head" + bytes + "end");
+  const std::string end = in_grid + "the file is truncated or damaged: unexpected end of file";
+  EXPECT_EQ(refusal(nrrd("type: uint8\nencoding: gzip\nbyte skip: -2\n", gzipped(bytes))), end);
+  EXPECT_EQ(refusal("NRRD0004\ntype: uint8\nsizes: 5 4 3\nencoding: raw\nbyte skip: -900\n\n" + bytes), end);
+  EXPECT_EQ(refusal(nrrd("type: uint8\nencoding: ascii\nbyte skip: -1\n", "1 2 3")),
+            "has a negative \"byte skip\" and is ascii");
+}
+
+TEST_F(ArrayFile, NrrdAxesWithoutSpace) {
+  const std::string bytes = bytes_of<std::uint8_t>();
+  const auto of_sizes = [&](const std::string& sizes, const std::string& fields) {
+    return nrrd("type: uint8\nencoding: raw\n" + fields, bytes, sizes);
+  };
+  // An axis of one entry behind those of space.
+  expect_values(read(write("a.nrrd", of_sizes("5 4 3 1", ""))));
+  const std::string last = "space directions: (2,0,0) (0,3,0) (0,0,4) none\n";
+  const ScalarVolume got = read(write("a.nrrd", of_sizes("1 20 3 1", last)));
+  EXPECT_EQ(got.bounds_max, ivec3(0, 19, 2));
+  EXPECT_EQ(got.index_to_world, glm::dmat4(2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 0, 0, 0, 1));
+  // A picture is no volume of three columns.
+  EXPECT_EQ(refusal(of_sizes("3 5 4", "kinds: RGB-color domain domain\n")),
+            "has 2 axes and one of the kind 'RGB-color' before them; 3 axes are read");
+  EXPECT_EQ(refusal(of_sizes("5 4 1 3", "")), "has 4 axes; 3 are read, and before them an axis of 1 or 3 components");
 }
 
 TEST_F(ArrayFile, BadNrrdIsOneLine) {
