@@ -611,7 +611,8 @@ ScalarVolume detail::assemble(SourceGrid source, const Log& log, const std::stri
     if (voxels > 0)
       log.warning(log_prefix + std::to_string(voxels) + what + (voxels == 1 ? " voxel" : " voxels") + how);
   };
-  warn(out.negative_voxels, " negative", " clamped to 0");
+  warn(out.negative_voxels, " negative",
+       out.max_value > 0.0F ? " clamped to 0" : " clamped to 0, and no value is above 0");
   warn(out.non_finite_voxels, " non-finite", " read as 0");
   warn(out.huge_voxels, "", " above 1e30 (fill values) read as 0");
   return std::move(out);

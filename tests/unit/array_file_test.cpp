@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/log.hpp"
 #include "support/array_files.hpp"
 #include "volume/frame_import.hpp"
 #include "volume/inspection.hpp"
@@ -222,6 +223,21 @@ TEST_F(ArrayFile, NrrdAxesWithoutSpace) {
   EXPECT_EQ(refusal(of_sizes("3 5 4", "kinds: RGB-color domain domain\n")),
             "has 2 axes and one of the kind 'RGB-color' before them; 3 axes are read");
   EXPECT_EQ(refusal(of_sizes("5 4 1 3", "")), "has 4 axes; 3 are read, and before them an axis of 1 or 3 components");
+}
+
+TEST_F(ArrayFile, WarnsOfNegativeValues) {
+  const auto warnings = [&](const std::string& text) {
+    std::vector<std::string> lines;
+    const Log log([&](LogLevel, const char* message) { lines.emplace_back(message); });
+    const std::string file = write("a.nrrd", nrrd("type: short\nencoding: ascii\n", text, "2 1 2"));
+    static_cast<void>(volume::import_volume(file, "", log));
+    std::string all;
+    for (const std::string& line : lines) all += line.substr(file.size() + 2) + "\n";
+    return all;
+  };
+  // Air, water and bone of a scanner.
+  EXPECT_EQ(warnings("-1000 0 -3 700\n"), in_grid + "2 negative voxels clamped to 0\n");
+  EXPECT_EQ(warnings("-1 -2 -3 0\n"), in_grid + "3 negative voxels clamped to 0, and no value is above 0\n");
 }
 
 TEST_F(ArrayFile, BadNrrdIsOneLine) {
