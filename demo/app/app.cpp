@@ -337,7 +337,8 @@ void App::accept(const Answer& answer) {
     set_volume(model_.scene, answer.volume);
     set_volume(sent.scene, answer.volume);
   }
-  if (answer.edits.surfaces == sent.edits.surfaces) model_.scene.surfaces = sent.scene.surfaces = answer.surfaces;
+  if (answer.edits.surfaces == sent.edits.surfaces && model_.scene.surfaces == sent.scene.surfaces)
+    model_.scene.surfaces = sent.scene.surfaces = answer.surfaces;
   if (answer.edits.environment == sent.edits.environment)
     model_.scene.environment = sent.scene.environment = answer.environment;
   if (!exchange_.waiting() && !loading_.environment.empty()) {

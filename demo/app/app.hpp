@@ -156,7 +156,7 @@ class App {
     bool pick = false;        // the volume being loaded was opened without a grid name
     bool starting = true;     // until the files of the command line are loaded or have failed
     bool discards = false;    // the user continues without the unsaved changes
-    bool surfaces = false;    // surfaces were opened beside other objects and are not placed yet
+    bool surfaces = false;    // a model was opened, not as a part of a scene, and is not placed yet
     bool fit_all = false;     // the command line gives no camera
     bool remark = false;      // remark on objects that are hard to see, when everything is loaded
     std::vector<Item> added;  // objects that were added and are not placed yet

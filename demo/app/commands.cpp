@@ -386,7 +386,10 @@ void App::open(const std::string& path) {
     model_.scene.visible = true;
     deselect(model_);
     loading_.fit = loading_.suggest = loading_.pick = loading_.reload = loading_.remark = true;
-    loading_.surfaces = !model_.scene.surfaces.empty();
+    for (std::size_t i = 0; i < model_.scene.models.size(); ++i) {
+      if (model_.scene.models[i].to_world == std::array<double, 16>{})
+        loading_.added.push_back({Item::Kind::model, i, 0});
+    }
   }
   meter_when_loaded();
   // A file that is only viewed needs no saving.

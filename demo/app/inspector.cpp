@@ -36,8 +36,6 @@ void Panel::inspector(Model& model, std::vector<Command>& commands) {
       return environment(model, commands);
     case Part::ground:
       return ground(model);
-    case Part::surfaces:
-      return surfaces(model);
   }
 }
 

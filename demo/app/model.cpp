@@ -175,10 +175,17 @@ Model::Model() {
   status.stats.struct_size = sizeof status.stats;
 }
 
+cumulet_surface_settings_desc shared_settings(const cumulet_surface_settings_desc& settings) {
+  cumulet_surface_settings_desc shared{};
+  shared.struct_size = sizeof shared;
+  shared.lighting = settings.lighting;
+  shared.indirect_roughness = settings.indirect_roughness;
+  return shared;
+}
+
 void open_surfaces(Model& model, const std::string& path) {
   model.scene.surfaces = path;
-  model.scene.surface = {};
-  model.scene.surface.struct_size = sizeof model.scene.surface;
+  model.scene.surface = shared_settings(model.scene.surface);
   model.scene.surface_variant.clear();
   model.scene.surface_camera = -1;
   // A model that is cut out for compositing needs no ground.

@@ -323,6 +323,8 @@ void set_default_ground(Model& model, cumulet_ground_mode wanted);
 
 /// Opens the surfaces of a file, which replace the previous ones.
 void open_surfaces(Model& model, const std::string& path);
+/// Returns only the settings that apply to all models.
+[[nodiscard]] cumulet_surface_settings_desc shared_settings(const cumulet_surface_settings_desc& settings);
 
 /// Adds a message to the displayed ones, where it replaces an equal one, and to the log. Errors stay; notices disappear
 /// after a while, those with a button later.

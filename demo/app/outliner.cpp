@@ -51,8 +51,6 @@ class Icon {
         line(-6.0f, 2.5f, 6.0f, 2.5f, grey);
         line(-3.0f, 5.0f, -1.0f, 2.5f, grey);
         return line(2.0f, 5.0f, 4.0f, 2.5f, grey);
-      case Part::surfaces:
-        return draw_kind(Item::Kind::model);
     }
   }
 
@@ -104,9 +102,8 @@ void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Comm
   const std::vector<Item> items = listed_items(model.scene);
   selected_ = selected_items(model);
   last_rows_ = std::exchange(rows_, {});
-  const bool has_surfaces = !model.scene.surfaces.empty();
   constexpr std::size_t fixed_rows = 9;  // parts, groups and an empty one
-  const auto rows = static_cast<float>(fixed_rows + items.size() + (has_surfaces ? 1 : 0));
+  const auto rows = static_cast<float>(fixed_rows + items.size());
   const float row_height = ImGui::GetTextLineHeightWithSpacing();
   ImGui::BeginChild("outliner", {0.0f, std::min(rows * row_height, max_height)}, false, ImGuiWindowFlags_NavFlattened);
   if (focus) ImGui::SetKeyboardFocusHere();
@@ -124,7 +121,6 @@ void Outliner::draw(Model& model, float max_height, bool focus, std::vector<Comm
   group("Volumes", "Add volume", "Adds another volume.", Action::add_volume_dialog, commands);
   all(Item::Kind::volume);
   group("Models", "Add model", "Adds another model.", Action::add_model_dialog, commands);
-  if (has_surfaces) surfaces(model, commands);
   all(Item::Kind::model);
   drag_box(model);
   ImGui::EndChild();
@@ -150,7 +146,7 @@ bool Outliner::row(const std::string& control, const char* tip, const std::strin
   ui_.remember(control.c_str(), tip);
   ImDrawList& list = *ImGui::GetWindowDrawList();
   const float height = ImGui::GetTextLineHeight();
-  const float indent = std::holds_alternative<Item>(subject) || subject == Subject(Part::surfaces) ? 14.0f : 2.0f;
+  const float indent = std::holds_alternative<Item>(subject) ? 14.0f : 2.0f;
   const float left = corner.x + ui_.px(indent);
   Icon(list, {left + ui_.px(9.0f), corner.y + 0.5f * height}, ui_.px(1.0f)).draw(subject);
   list.PushClipRect(corner, {corner.x + width, corner.y + height + ui_.px(2.0f)}, true);
@@ -182,17 +178,6 @@ void Outliner::group(const char* label, const char* control, const char* tip, Ac
   ImDrawList& list = *ImGui::GetWindowDrawList();
   list.AddLine({middle.x - arm, middle.y}, {middle.x + arm, middle.y}, color, ui_.px(1.5f));
   list.AddLine({middle.x, middle.y - arm}, {middle.x, middle.y + arm}, color, ui_.px(1.5f));
-}
-
-void Outliner::surfaces(Model& model, std::vector<Command>& commands) {
-  const std::string name = std::filesystem::path(model.scene.surfaces).filename().string();
-  if (row("Scene/Surfaces", "The model that was opened. It cannot be moved; add the file to Models to move it.", name,
-          Part::surfaces, model, 0.0f))
-    select(model, Part::surfaces);
-  if (!ImGui::BeginPopupContextItem("surfaces menu")) return;
-  if (ImGui::MenuItem("Delete", "Del")) commands.push_back({Action::remove_selected});
-  ui_.remember("Object/Delete", "Removes the surfaces from the scene.");
-  ImGui::EndPopup();
 }
 
 void Outliner::item(Model& model, const Item& item, std::vector<Command>& commands) {

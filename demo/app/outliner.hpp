@@ -36,7 +36,6 @@ class Outliner {
   // Lets the last drawn row be dragged to another row, and others to it.
   void drag(const Item& item);
   void drag_box(Model& model);
-  void surfaces(Model& model, std::vector<Command>& commands);
   // Draws the row of a kind of objects, with a button that adds one.
   void group(const char* label, const char* control, const char* tip, Action add, std::vector<Command>& commands);
   // Draws a row and returns true if it was clicked. room: width at the right for another control.

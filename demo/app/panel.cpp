@@ -233,19 +233,6 @@ void Panel::sun_angle(const settings::SettingInfo& info, cumulet_sun_sky_desc& l
   if (rows_.draw(info, shown)) light.sun_angle_degrees = shown > 0.0 ? static_cast<float>(shown) : -1.0F;
 }
 
-void Panel::surfaces(Model& model) {
-  using Desc = cumulet_surface_settings_desc;
-  Desc& surface = model.scene.surface;
-  const cumulet_surfaces_info& info = model.status.surfaces;
-  ui_.value_row("Model", model.scene.surfaces);
-  settings::for_each<Desc>([&](const auto& setting) {
-    if (!setting.is(&Desc::time)) rows_.draw(setting, surface.*setting.field);
-  });
-  animation(model, model.status.surfaces_file, surface.animation, surface.time);
-  variant(model.status.surfaces_file, model.scene.surface_variant);
-  ui_.value_row("Triangles", short_count(double(info.triangles)));
-}
-
 void Panel::animation(const Model& model, const ModelFile& file, std::uint32_t& number, double& time) {
   const std::vector<ModelFile::Animation>& animations = file.animations;
   if (animations.empty()) return;
@@ -414,6 +401,13 @@ void Panel::advanced_sampling(Model& model) {
   settings::for_each<Desc>([&](const auto& setting) {
     if (setting.is(&Desc::seed) || setting.is(&Desc::region) || setting.is(&Desc::shutter_seconds))
       rows_.draw(setting, model.scene.sampling.*setting.field);
+  });
+  // These apply to all models.
+  settings::for_each<cumulet_surface_settings_desc>([&](const auto& setting) {
+    if (model.scene.models.empty()) return;
+    if (setting.is(&cumulet_surface_settings_desc::lighting) ||
+        setting.is(&cumulet_surface_settings_desc::indirect_roughness))
+      rows_.draw(setting, model.scene.surface.*setting.field);
   });
   ui_.checkbox("Fast preview", "Renders at a lower resolution during changes. Off: always full resolution.",
                model.adaptive_resolution);

@@ -82,7 +82,6 @@ class Panel {
   void color_ramp(Model& model, SceneVolume& volume, std::size_t index, float most);
   // Draws the presets of a color ramp, and the buttons that copy and paste it.
   void choose_colors(Model& model, settings::ColorStops& stops, std::size_t index, float most);
-  void surfaces(Model& model);
   // Draws the animation of a model and the time in it.
   void animation(const Model& model, const ModelFile& file, std::uint32_t& number, double& time);
   // Draws the material variant of a model.

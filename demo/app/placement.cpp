@@ -56,7 +56,7 @@ std::optional<Box> box_of_surfaces(const Model& model) {
   return Box{{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-/// Returns the box of all objects except one and the surfaces.
+/// Returns the box of all objects except one.
 std::optional<Box> box_of_items(const Model& model, const std::optional<Item>& except) {
   std::optional<Box> all;
   for (const Item& other : items_of(model.scene)) {
@@ -70,11 +70,7 @@ std::optional<Box> box_of_items(const Model& model, const std::optional<Item>& e
 
 }  // namespace
 
-std::optional<Box> box_of_others(const Model& model, const Item& item) {
-  std::optional<Box> all = box_of_items(model, item);
-  if (const auto surfaces = box_of_surfaces(model)) add(all, *surfaces, glm::dmat4(1.0));
-  return all;
-}
+std::optional<Box> box_of_others(const Model& model, const Item& item) { return box_of_items(model, item); }
 
 std::optional<Placement> place_in(const Box& scene, const Box& object, const dvec3& eye) {
   constexpr double max_ratio = 30.0;  // of sizes
@@ -105,10 +101,10 @@ std::optional<Placement> place_in(const Box& scene, const Box& object, const dve
   return placement;
 }
 
-void place(Model& model, const Item& item, const Box& box, const Box& others, double now) {
+bool place(Model& model, const Item& item, const Box& box, const Box& others, double now) {
   const auto& eye = model.scene.camera.eye;
   const auto placement = place_in(others, box, {eye[0], eye[1], eye[2]});
-  if (!placement) return;
+  if (!placement) return false;
   set_transform(model.scene, item, placement->transform);
   const double ratio = size_of(box) / size_of(others);
   std::array<char, 96> text{};
@@ -125,21 +121,30 @@ void place(Model& model, const Item& item, const Box& box, const Box& others, do
                MessageButton{"Own place",
                              "Restores the size and the place of the file.",
                              {Action::keep_place, is_model ? "model" : "volume", static_cast<int>(item.index)}});
+  return true;
 }
 
-bool place_surfaces(Model& model, double now) {
+bool adopt_surfaces(Model& model, bool in_view, double now) {
   SceneOptions& scene = model.scene;
+  if (scene.surfaces.empty()) return false;
   const auto box = box_of_surfaces(model);
   const auto others = box_of_items(model, std::nullopt);
-  const auto& eye = scene.camera.eye;
-  if (!box || !others || !place_in(*others, *box, {eye[0], eye[1], eye[2]})) return false;
-  scene.models.push_back({.file = std::exchange(scene.surfaces, ""),
-                          .time = scene.surface.time,
-                          .animation = scene.surface.animation,
-                          .variant = std::exchange(scene.surface_variant, ""),
-                          .double_sided = scene.surface.double_sided != 0});
-  place(model, {Item::Kind::model, scene.models.size() - 1, 0}, *box, *others, now);
-  return true;
+  const cumulet_surface_settings_desc& settings = scene.surface;
+  // The surfaces of a scene file are its first model.
+  const std::size_t index = in_view ? scene.models.size() : 0;
+  if (index < scene.models.size()) deselect(model);
+  scene.models.insert(scene.models.begin() + static_cast<std::ptrdiff_t>(index),
+                      {.file = std::exchange(scene.surfaces, ""),
+                       .holdout = settings.holdout != 0,
+                       .time = settings.time,
+                       .animation = settings.animation,
+                       .variant = std::exchange(scene.surface_variant, ""),
+                       .double_sided = settings.double_sided != 0,
+                       .group = settings.group});
+  scene.surface = shared_settings(settings);
+  scene.surface_camera = -1;  // the scene's camera has its pose
+  const Item item{Item::Kind::model, index, 0};
+  return in_view && box && others && place(model, item, *box, *others, now);
 }
 
 bool remark_on_tiny(Model& model, double now) {
@@ -156,11 +161,6 @@ bool remark_on_tiny(Model& model, double now) {
     const auto box = box_of(scene, model.status.boxes, item);
     if (!box) return false;
     add_box(row_text(scene, item), *box, transform_of(scene, item).value_or(glm::dmat4(1.0)));
-  }
-  if (!scene.surfaces.empty()) {
-    const auto box = box_of_surfaces(model);
-    if (!box) return false;
-    add_box(std::filesystem::path(scene.surfaces).filename().string(), *box, glm::dmat4(1.0));
   }
   for (const std::string& remark : remarks_on_tiny(boxes)) show_message(model, false, remark, now);
   return true;
@@ -191,9 +191,16 @@ void App::drop_failed(const std::string& file) {
 }
 
 void App::place_added() {
-  // The program has placed the camera by the file's own place.
-  if (std::exchange(loading_.surfaces, false) && place_surfaces(model_, now_) && loading_.starting && loading_.fit_all)
-    request({Request::Type::frame_all});
+  if (!model_.scene.surfaces.empty()) {
+    const bool opened = std::exchange(loading_.surfaces, false);
+    // The program has placed the camera by the file's own place.
+    if (adopt_surfaces(model_, opened, now_) && loading_.starting && loading_.fit_all)
+      request({Request::Type::frame_all});
+    if (loading_.starting)
+      history_.emplace(model_.scene);
+    else if (opened)
+      select(model_, Item{Item::Kind::model, model_.scene.models.size() - 1, 0});
+  }
   for (const Item& item : std::exchange(loading_.added, {})) {
     if (!transform_of(model_.scene, item)) continue;
     const auto box = box_of(model_.scene, model_.status.boxes, item);

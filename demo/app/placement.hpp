@@ -22,9 +22,12 @@ struct Placement {
 
 /// Gives an object that was just added its place beside the others, if its own is unsuitable, and shows a message.
 /// box: of the object, without the transform of the scene. now: seconds, of the message, here and below.
-void place(Model& model, const Item& item, const Box& box, const Box& others, double now);
-/// Does so with the scene's surfaces, which become a model, because surfaces have no transform. Returns true if it did.
-bool place_surfaces(Model& model, double now);
+/// Returns true if it gave the object a place.
+bool place(Model& model, const Item& item, const Box& box, const Box& others, double now);
+/// Turns the loaded surfaces into a model of the scene, so that they can be moved, named and hidden as all models. Does
+/// nothing without surfaces. in_view: places the model as place() does.
+/// Returns true if the model got a place.
+bool adopt_surfaces(Model& model, bool in_view, double now);
 /// Shows a message for each object that a view of the whole scene hardly shows. Returns false if the box of an object
 /// is not known yet.
 bool remark_on_tiny(Model& model, double now);

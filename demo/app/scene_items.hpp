@@ -24,7 +24,7 @@ struct Item {
 };
 
 /// A part of the scene that exists once.
-enum class Part { render, camera, sun_sky, environment, ground, surfaces };
+enum class Part { render, camera, sun_sky, environment, ground };
 /// A part or an object of the scene, as the inspector shows it.
 using Subject = std::variant<Part, Item>;
 

@@ -32,12 +32,10 @@ Subject subject_of(const Model& model) {
   const std::vector<Item> items = listed_items(model.scene);
   if (model.subject) {
     const Item* item = std::get_if<Item>(&*model.subject);
-    const bool exists = item != nullptr ? contains(items, *item)
-                                        : *model.subject != Subject(Part::surfaces) || !model.scene.surfaces.empty();
-    if (exists) return *model.subject;
+    if (item == nullptr || contains(items, *item)) return *model.subject;
   }
   if (!items.empty()) return items.front();
-  return model.scene.surfaces.empty() ? Part::render : Part::surfaces;
+  return Part::render;
 }
 
 std::vector<Item> selected_items(const Model& model) {
@@ -83,9 +81,7 @@ void deselect(Model& model) {
   model.marked.clear();
 }
 
-bool can_remove(const Model& model) { return can_duplicate(model) || subject_of(model) == Subject(Part::surfaces); }
-
-bool can_duplicate(const Model& model) { return !selected_items(model).empty(); }
+bool has_selection(const Model& model) { return !selected_items(model).empty(); }
 
 bool can_hide(const Model& model) {
   return std::ranges::any_of(selected_items(model),
@@ -93,9 +89,8 @@ bool can_hide(const Model& model) {
 }
 
 void remove_selected(Model& model) {
-  if (!can_remove(model)) return;
   std::vector<Item> items = selected_items(model);
-  if (items.empty()) model.scene.surfaces.clear();
+  if (items.empty()) return;
   // From the last one, because a removal changes the indices of later objects.
   std::ranges::reverse(items);
   for (const Item& item : items) remove_item(model.scene, item);

@@ -22,9 +22,8 @@ void toggle_selected(Model& model, const Item& item);
 void select_items(Model& model, std::vector<Item> items, const Item& subject);
 void deselect(Model& model);
 
-/// Returns true if the selection can be removed or duplicated.
-[[nodiscard]] bool can_remove(const Model& model);
-[[nodiscard]] bool can_duplicate(const Model& model);
+/// Returns true if an object is selected, which can be removed or duplicated.
+[[nodiscard]] bool has_selection(const Model& model);
 /// Returns true if the selection contains an object that can be hidden.
 [[nodiscard]] bool can_hide(const Model& model);
 void remove_selected(Model& model);

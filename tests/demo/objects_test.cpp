@@ -152,7 +152,7 @@ TEST(PlacementTest, OthersAreAllObjectsWithAKnownBox) {
   EXPECT_EQ(others->most, dvec3(110, 10, 10));
 }
 
-TEST(PlacementTest, SurfacesOfAnotherSizeBecomeAModelWithAPlace) {
+TEST(PlacementTest, SurfacesBecomeAModelWithAPlaceIfTheyNeedOne) {
   Model model;
   model.scene.volume = "/a/cloud.vdb";
   model.status.boxes.volumes = {{model.scene, cube({0, 0, 0}, 100.0)}};
@@ -165,13 +165,25 @@ TEST(PlacementTest, SurfacesOfAnotherSizeBecomeAModelWithAPlace) {
     }
   };
   set_size(50.0);
-  EXPECT_FALSE(place_surfaces(model, 0.0));
-  EXPECT_EQ(model.scene.surfaces, "/a/fox.glb");
-  set_size(0.5);
-  EXPECT_TRUE(place_surfaces(model, 0.0));
+  model.scene.surface.holdout = 1;
+  model.scene.surface.animation = 2;
+  model.scene.surface_variant = "red";
+  EXPECT_FALSE(adopt_surfaces(model, true, 0.0));
   EXPECT_EQ(model.scene.surfaces, "");
   ASSERT_EQ(model.scene.models.size(), 1U);
-  EXPECT_EQ(model.scene.models[0].file, "/a/fox.glb");
+  const SceneModel adopted{.file = "/a/fox.glb", .holdout = true, .animation = 2, .variant = "red"};
+  EXPECT_EQ(model.scene.models[0], adopted);
+  EXPECT_EQ(model.scene.surface.animation, 0U);
+  EXPECT_FALSE(adopt_surfaces(model, true, 0.0)) << "there are no surfaces";
+  set_size(0.5);
+  model.scene.surfaces = "/a/fox.glb";
+  EXPECT_FALSE(adopt_surfaces(model, false, 0.0)) << "a scene has given it its place";
+  ASSERT_EQ(model.scene.models.size(), 2U);
+  EXPECT_EQ(model.scene.models[1], adopted) << "a scene's surfaces are its first model";
+  model.scene.models.clear();
+  model.scene.surfaces = "/a/fox.glb";
+  EXPECT_TRUE(adopt_surfaces(model, true, 0.0));
+  ASSERT_EQ(model.scene.models.size(), 1U);
   const auto transform = transform_of(model.scene, {Item::Kind::model, 0, 0});
   ASSERT_TRUE(transform);
   EXPECT_NEAR((*transform)[0][0], 50.0, 1e-9);

@@ -24,12 +24,10 @@ using cumulet::test::PanelTest;
 
 TEST_P(PanelTest, EveryControlHasATooltipAndItsOwnArea) {
   model_.scene.volume = "/a/cloud.vdb";
-  model_.scene.surfaces = "/a/town.glb";
   model_.scene.models.push_back({"/a/tree.glb"});
-  std::vector<Subject> subjects = {Part::render,      Part::camera, Part::sun_sky,
-                                   Part::environment, Part::ground, Part::surfaces};
+  std::vector<Subject> subjects = {Part::render, Part::camera, Part::sun_sky, Part::environment, Part::ground};
   for (const Item& item : listed_items(model_.scene)) subjects.emplace_back(item);
-  EXPECT_EQ(subjects.size(), 10u);
+  EXPECT_EQ(subjects.size(), 9u);
   for (const Subject& subject : subjects) {
     select(model_, subject);
     frame();
@@ -107,10 +105,10 @@ TEST_P(PanelTest, DrawingChangesNothing) {
 
 TEST_P(PanelTest, SceneWithOnlyAModelIsListedAndSaved) {
   model_ = Model();
-  model_.scene.surfaces = "/a/town.glb";
+  model_.scene.models.push_back({"/a/town.glb"});
   model_.status.has_content = true;
   for (int i = 0; i < 2; ++i) frame();
-  EXPECT_TRUE(panel_.ui().controls().contains("Scene/Surfaces"));
+  EXPECT_TRUE(panel_.ui().controls().contains("Scene/Model 1"));
   EXPECT_NE(panel_.state(), "");
   model_.status.saving = "/b/picture.png";
   frame();

@@ -62,7 +62,7 @@ TEST(Selection, ClicksWithCtrlAddAndRemove) {
   EXPECT_EQ(selected_items(model), std::vector<Item>{light(0)}) << "the last one stays";
   select(model, Part::camera);
   EXPECT_TRUE(selected_items(model).empty());
-  EXPECT_FALSE(can_remove(model) || can_duplicate(model) || can_hide(model));
+  EXPECT_FALSE(has_selection(model) || can_hide(model));
 }
 
 TEST(Selection, AllOfItIsRemoved) {

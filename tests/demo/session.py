@@ -181,7 +181,7 @@ def test_dropped_together(s):
            "--spp", "1")
     several, frames = s.report("several"), s.report("frames")
     assert [pathlib.Path(volume["file"]).name for volume in several["volumes"]] == ["cumulus.vdb", "explosion_0012.vdb"], several
-    assert "mountains.glb" in json.dumps(several["scene"]) and not [m for m in several["messages"] if m["error"]], several
+    assert "mountains.glb" in json.dumps(several["models"]) and not [m for m in several["messages"] if m["error"]], several
     assert frames["sequence"]["count"] == 3 and "blast_#.vdb" in json.dumps(frames["volumes"][0]), frames
     assert pathlib.Path(frames["volumes"][1]["file"]).name == "explosion_0012.vdb", frames["volumes"]
     assert s.report("plays")["sequence"]["clock"] > 0, "a dropped sequence plays"
@@ -366,7 +366,7 @@ def test_failures(s):
     assert "mountains.glb: no animation 99; the file has " in done.stderr, done
     report = s.report("report")
     assert [m for m in report["messages"] if m["error"] and "animation 99" in m["text"]], report["messages"]
-    assert "surfaces" not in report["scene"] and report["recent"] == [], report
+    assert report["models"] == [] and report["recent"] == [], report
     s.play("later", ["wait loaded", f'drop "{s.out}/cut.vdb"', "frames 3", "wait loaded", *shot("later")], "--volume",
            s.cumulus)
     assert s.report("later")["recent"] == [s.cumulus], s.report("later")["recent"]
@@ -383,7 +383,7 @@ def test_failures(s):
         report = s.report("report")
         assert [m["text"] for m in report["messages"] if m["error"] and missing in m["text"]], report["messages"]
         assert report["recent"][0] == there and missing not in " ".join(report["recent"]), report["recent"]
-        assert report["has_volume"] == (there == volume) and ("surfaces" in report["scene"]) == (there == surfaces), report
+        assert report["has_volume"] == (there == volume) and bool(report["models"]) == (there == surfaces), report
 
 
 def test_settings(s):

@@ -237,28 +237,34 @@ def test_timeline(s):
 
 
 def test_surfaces(s):
+    """A model that was opened has the rows, the eye and the gizmo of every model."""
+    away = ["move viewport 0.02 0.5", "frames 2"]  # no tooltip covers the picture
     mountains = str(pathlib.Path(s.cumulus).with_name("mountains.glb"))
-    s.play("replay", [*SETTLE, *shot("first"), *shown("Surfaces"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
+    s.play("replay", [*SETTLE, *shot("first"), *shown("Render"), *tab("Advanced"), 'drag "Indirect roughness" 0.02 0.5 to "Indirect roughness" 0.6 0.5', *SETTLE,
                       *shot("soft"), 'click "Surface lighting"', "frames 2", 'click "Surface lighting/Rasterized"', *SETTLE, *shot("none"),
-                      "key delete", *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
+                      *shown("Model 1"), *shown("Model 1", "Eye/"), *away, *SETTLE, *shot("hidden"), *shown("Model 1", "Eye/"), "key delete",
+                      *away, *SETTLE, *shot("removed"), "key ctrl+z", *SETTLE, *shot("back")],
            "--volume", s.cumulus, "--gltf", mountains, "--spp", "2")
     first, report, area = look(s, "first")
-    assert report["scene"]["surfaces"]["indirect_roughness"] == 0
+    assert report["models"][0]["indirect_roughness"] == 0
     soft, soft_report, _ = look(s, "soft")
-    assert 0.4 < soft_report["scene"]["surfaces"]["indirect_roughness"] < 0.8, soft_report["scene"]["surfaces"]
+    assert 0.4 < soft_report["models"][0]["indirect_roughness"] < 0.8, soft_report["models"]
     assert difference(first, soft, area) != (0, 0), "the same samples find rougher surfaces"
     none, none_report, _ = look(s, "none")
-    assert none_report["scene"]["surfaces"]["light"] == "none"
+    assert none_report["models"][0]["lighting"] == "rasterized"
     assert difference(soft, none, area) != (0, 0)
+    hidden, hidden_report, _ = look(s, "hidden")
+    assert [one["file"] for one in hidden_report["models"]] == [mountains] and hidden_report["undo_steps"] > 0, hidden_report["models"]
+    assert_differ(none, hidden, area)
     removed, removed_report, _ = look(s, "removed")
-    assert "surfaces" not in removed_report["scene"]
+    assert removed_report["models"] == []
     assert_differ(none, removed, area)
     assert_alike(none, look(s, "back")[0], area)
 
 
 def test_animated_model(s):
-    """An added model has rows for its animation, the time in it and its material variant, as the first model has. While
-    a sequence is shown, the time is that of its clock."""
+    """A model has rows for its animation, the time in it and its material variant. While a sequence is shown, the time is
+    that of its clock."""
     write_moving_model(s.out / "rising.gltf")
     camera = {"eye": [-5, 4, 44], "target": [-5, 4, 0]}
     light = {"environment": {"sun": {"azimuth_degrees": 20, "irradiance": [3, 3, 3]}, "sky": {"radiance": [0.4, 0.5, 0.6]}}}
@@ -268,7 +274,7 @@ def test_animated_model(s):
     choose = lambda label, entry: [f'click "{label}"', "frames 2", f'click "{label}/{entry}"', *there, "move viewport 0.02 0.5", *there]
     rows = lambda name: [f'click "Scene/{name}"', *there]
     s.play("models",
-           [*there, *rows("Model 1"), *shot("before"), 'drag "Time" 0.01 0.5 to "Time" 0.5 0.5', *there, *shot("risen"),
+           [*there, *rows("Model 2"), *shot("before"), 'drag "Time" 0.01 0.5 to "Time" 0.5 0.5', *there, *shot("risen"),
             *choose("Animation", "slide"), *shot("slid"), *choose("Variant", "green"), *shot("green"), "key ctrl+z", *there, *shot("undone")],
            "--scene", "still.json", "--spp", "4", size=["--size", "1000x700"])
     model = lambda name: s.report(name)["models"][1]
